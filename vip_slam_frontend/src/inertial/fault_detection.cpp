@@ -12,6 +12,8 @@ namespace vip_slam::frontend {
 
 namespace {
 
+// The share of the last second from which on it is at fault. While a body may fill the view it is half of it.
+constexpr double kSustained = 0.2;
 // A turn by so much shows whether the vertical is right, rad: wrong axes make 3 m/s^2 of it.
 constexpr double kShowsVertical = 0.3;
 
@@ -37,6 +39,7 @@ bool FaultDetection::add(const MotionEvidence& e) {
   const bool contradicts = e.images_agree && (e.implausible || deviates || (suspects(e.t) && e.sigmas > kGateSigmas));
   const double gain = std::min(1.0, e.interval / kFaultMemory);
   if (e.images_agree) contradicted_ += gain * (contradicts - contradicted_);
+  if (!e.images_agree) disagreed_t_ = e.t;
   if (!e.images_agree || deviates) {
     if (e.t - doubt_t_ > kMoment) began_t_ = e.t;
     doubt_t_ = e.t;
@@ -44,7 +47,8 @@ bool FaultDetection::add(const MotionEvidence& e) {
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;
   const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || isOnProbation(e.t));
-  const bool fault = begins || goes_on || (contradicts && 2 * contradicted_ > 1);
+  const double share = e.t - disagreed_t_ > kFaultMemory ? kSustained : 0.5;
+  const bool fault = begins || goes_on || (contradicts && contradicted_ > share);
   // An IMU whose faults come back is believed again later each time.
   if (fault) {
     const double since = e.t - last_fault_t_;

@@ -53,10 +53,11 @@ class FaultDetection {
   double isolation() const { return std::max(kMoment, isolated_); }
 
   double last_fault_t_ = -1e300;
-  double doubt_t_ = -1e300;  ///< last interval that deviated, or that gave no test
-  double began_t_ = -1e300;  ///< first such interval after agreement: a fault may begin there
-  double contradicted_ = 0;  ///< share of the last second
-  double isolated_ = 0;      ///< s for which the IMU stays isolated after a fault
+  double disagreed_t_ = -1e300;  ///< images among themselves
+  double doubt_t_ = -1e300;      ///< last interval that deviated, or that gave no test
+  double began_t_ = -1e300;      ///< first such interval after agreement: a fault may begin there
+  double contradicted_ = 0;      ///< share of the last second
+  double isolated_ = 0;          ///< s for which the IMU stays isolated after a fault
   /// Until the vertical is confirmed: by how much further the body has turned in agreement than in contradiction,
   /// within the turn that shows the vertical, rad.
   double agreement_ = 0;
