@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "vip_slam_backend/optimisation/inertial_scale.h"
-#include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/runner/run_output.h"
 #include "vip_slam_core/util/formatted.h"
 
