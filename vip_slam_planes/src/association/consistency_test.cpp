@@ -7,6 +7,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "vip_slam_core/util/significance.h"
+
 namespace vip_slam {
 namespace {
 
@@ -17,12 +19,11 @@ bool estimate(const std::vector<PointSighting>& sightings, const Eigen::Matrix<d
   using MatrixN = Eigen::Matrix<double, N, N>;
   using VectorN = Eigen::Matrix<double, N, 1>;
   constexpr int kRounds = 5;
-  constexpr double kHuber = 2.0;
   for (int round = 0; round < kRounds; ++round) {
     MatrixN H = MatrixN::Zero();
     VectorN g = VectorN::Zero();
     const auto addRow = [&](const Eigen::RowVector3d& J, double r) {
-      const double w = std::abs(r) > kHuber ? kHuber / std::abs(r) : 1.0;
+      const double w = std::abs(r) > kNoiseSigmas ? kNoiseSigmas / std::abs(r) : 1.0;
       const Eigen::Matrix<double, 1, N> row = J * B;
       H.noalias() += w * row.transpose() * row;
       g.noalias() += w * row.transpose() * r;

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstdint>
+#include <map>
+#include <utility>
 
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/significance.h"
@@ -41,31 +43,20 @@ std::vector<Eigen::Vector3d> PlaneSampler::spreadEvenly(const std::vector<Eigen:
   const Eigen::Matrix<double, 3, 2> basis = tangentBasis(n);
   std::vector<Eigen::Vector2d> at;
   at.reserve(points.size());
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::max()), high = -low;
-  for (const Eigen::Vector3d& p : points) {
-    at.push_back(basis.transpose() * p);
-    low = low.cwiseMin(at.back()), high = high.cwiseMax(at.back());
-  }
-  // Index of each voxel's sum within the points' bounds; the voxel size is raised when there would be more than these.
-  constexpr double kMaxVoxels = 1e6;
-  std::vector<int> index;
-  double voxel = std::max(options_.voxel, std::sqrt((high - low).prod() / kMaxVoxels));
+  for (const Eigen::Vector3d& p : points) at.push_back(basis.transpose() * p);
+  std::map<std::pair<std::int64_t, std::int64_t>, std::size_t> index;  // of each voxel's sum
+  double voxel = options_.voxel;
   std::vector<std::pair<Eigen::Vector3d, int>> sums;
   while (true) {
-    const Eigen::Vector2d first = (low / voxel).array().floor(), last = (high / voxel).array().floor();
-    const auto width = static_cast<std::size_t>(last.x() - first.x()) + 1;
-    index.assign(width * (static_cast<std::size_t>(last.y() - first.y()) + 1), -1);
+    index.clear();
     sums.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector2d q = (at[i] / voxel).array().floor();
-      int& sum =
-          index[static_cast<std::size_t>(q.y() - first.y()) * width + static_cast<std::size_t>(q.x() - first.x())];
-      if (sum < 0) {
-        sum = static_cast<int>(sums.size());
-        sums.emplace_back(Eigen::Vector3d::Zero(), 0);
-      }
-      sums[sum].first += points[i];
-      ++sums[sum].second;
+      const auto key = std::make_pair(static_cast<std::int64_t>(q.y()), static_cast<std::int64_t>(q.x()));
+      const auto [sum, fresh] = index.try_emplace(key, sums.size());
+      if (fresh) sums.emplace_back(Eigen::Vector3d::Zero(), 0);
+      sums[sum->second].first += points[i];
+      ++sums[sum->second].second;
     }
     if (sums.size() > std::size_t(options_.max_points)) {
       voxel *= 1.02 * std::sqrt(double(sums.size()) / options_.max_points);

@@ -9,12 +9,6 @@
 #include "vip_slam_planes/association/consistency_test.h"
 
 namespace vip_slam {
-namespace {
-
-// Largest number of views of one point in a test; more only cost time.
-constexpr std::size_t kMaxSightings = 12;
-
-}  // namespace
 
 void PointAssociation::assign(LandmarkId id, Landmark* landmark, PlaneId candidate, PlaneId plane) {
   undecided_ -= undecided(*landmark);
@@ -127,9 +121,7 @@ bool PointAssociation::isDue(const Landmark& landmark) const {
 
 void PointAssociation::test(LandmarkId id, Landmark* landmark, const CameraPoses& poses, const Plane& plane) {
   std::vector<PointSighting> sightings;
-  const std::size_t step = (landmark->sightings.size() + kMaxSightings - 1) / kMaxSightings;
-  for (std::size_t i = 0; i < landmark->sightings.size(); i += std::max<std::size_t>(1, step)) {
-    const Sighting& s = landmark->sightings[i];
+  for (const Sighting& s : landmark->sightings) {
     const auto pose = poses.find(s.keyframe);
     if (pose == poses.end()) continue;
     sightings.push_back({pose->second.inverse(), s.xy.cast<double>(), double(s.depth),

@@ -7,19 +7,17 @@
 namespace vip_slam {
 
 bool CellGrid::cover(CellIndex c) {
-  constexpr int kSlack = 8;  // cells allocated in advance, so that growth seldom copies
   // 64 MB, 800 m x 800 m of cells of 10 cm: cells beyond must be due to a wrong pose.
-  constexpr std::int64_t kMaxCells = 1 << 26, kFarthest = 1 << 24;
-  if (std::abs(std::int64_t(c.x)) > kFarthest || std::abs(std::int64_t(c.y)) > kFarthest) return false;
+  constexpr std::int64_t kMaxCells = 1 << 26;
+  if (std::abs(std::int64_t(c.x)) > kMaxCells || std::abs(std::int64_t(c.y)) > kMaxCells) return false;
   if (hits_.empty()) {
-    x0_ = c.x - kSlack, y0_ = c.y - kSlack, width_ = height_ = 2 * kSlack + 1;
-    hits_.assign(static_cast<std::size_t>(width_) * height_, 0);
+    x0_ = c.x, y0_ = c.y, width_ = height_ = 1;
+    hits_.assign(1, 0);
     return true;
   }
   if (c.x >= x0_ && c.y >= y0_ && c.x < x0_ + width_ && c.y < y0_ + height_) return true;
-  const int x0 = c.x < x0_ ? c.x - kSlack : x0_, y0 = c.y < y0_ ? c.y - kSlack : y0_;
-  const int x1 = c.x >= x0_ + width_ ? c.x + kSlack + 1 : x0_ + width_;
-  const int y1 = c.y >= y0_ + height_ ? c.y + kSlack + 1 : y0_ + height_;
+  const int x0 = std::min(x0_, c.x), y0 = std::min(y0_, c.y);
+  const int x1 = std::max(x0_ + width_, c.x + 1), y1 = std::max(y0_ + height_, c.y + 1);
   if (std::int64_t(x1 - x0) * (y1 - y0) > kMaxCells) return false;
   std::vector<std::uint8_t> hits(static_cast<std::size_t>(x1 - x0) * (y1 - y0), 0);
   for (int j = 0; j < height_; ++j) {

@@ -4,15 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 
 namespace vip_slam {
 namespace {
 
 // Directions of travel along cell corners, covered cells on the left: east, north, west, south.
 constexpr int kDx[4] = {1, 0, -1, 0}, kDy[4] = {0, 1, 0, -1};
-constexpr int kWord = 8;  // cells compared at once
-constexpr std::uint64_t kAllCovered = 0x0101010101010101u;
 
 class Tracer {
  public:
@@ -35,11 +32,6 @@ class Tracer {
     for (int y = y0_; y < y0_ + height_; ++y) {
       const unsigned char *below = &covered_[cell(x0_ - 1, y - 1)], *above = &covered_[cell(x0_ - 1, y)];
       for (int i = 0; i < width_; ++i) {
-        // Most corners have four equal cells around them, and so do their neighbours: skip them by words.
-        if (i + kWord <= width_ && uniform(below + i, above + i)) {
-          i += kWord - 1;
-          continue;
-        }
         const int around = below[i] + below[i + 1] + above[i] + above[i + 1];
         if (around == 0 || around == 4) continue;
         const CellIndex c{x0_ + i, y};
@@ -57,13 +49,6 @@ class Tracer {
     return static_cast<std::size_t>(y - y0_ + 1) * (width_ + 1) + static_cast<std::size_t>(x - x0_ + 1);
   }
   bool covered(int x, int y) const { return covered_[cell(x, y)]; }
-  // Whether kWord + 1 cells of two rows are all covered or all empty.
-  static bool uniform(const unsigned char* below, const unsigned char* above) {
-    std::uint64_t b, a;
-    std::memcpy(&b, below, kWord);
-    std::memcpy(&a, above, kWord);
-    return b == a && (b == 0 || b == kAllCovered) && below[kWord] == below[0] && above[kWord] == above[0];
-  }
   // A step from corner (x, y) is a border when the cell on its left is covered and the one on its right is not.
   bool border(CellIndex c, int direction) const {
     switch (direction) {

@@ -18,7 +18,6 @@ struct CellBox {
 // Bounds of the cells that may lie in the image within `range` along its axis, from the view's pyramid projected onto
 // the plane: a floor has tens of thousands of cells, an image shows a few hundred.
 CellBox cellsInView(const PlaneTrack& track, const CameraModel& camera, const SE3& T_map_C, double range) {
-  constexpr double kSlack = 1.02;  // lens distortion bends the sides of the image between the points used
   const CellGrid& cells = track.cells();
   const CellBox all{{cells.x0(), cells.y0()}, {cells.x0() + cells.width() - 1, cells.y0() + cells.height() - 1}};
   Eigen::Vector2d low = track.toPlane(T_map_C.t()), high = low;
@@ -26,7 +25,7 @@ CellBox cellsInView(const PlaneTrack& track, const CameraModel& camera, const SE
     Eigen::Vector2d xy;
     const Eigen::Vector2d uv(0.5 * (k % 3) * camera.width(), 0.5 * (k / 3) * camera.height());
     if (!camera.undistort(uv - Eigen::Vector2d(0.5, 0.5), &xy)) return all;
-    const Eigen::Vector2d q = track.toPlane(T_map_C * (range * Eigen::Vector3d(kSlack * xy.x(), kSlack * xy.y(), 1.0)));
+    const Eigen::Vector2d q = track.toPlane(T_map_C * (range * Eigen::Vector3d(xy.x(), xy.y(), 1.0)));
     low = low.cwiseMin(q), high = high.cwiseMax(q);
   }
   return {track.cellAt(low), track.cellAt(high)};

@@ -8,7 +8,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kCorners = 4;
 constexpr int kMargin = 64;  // px between the image and the enclosing box
 // Differences below 2^14 lattice steps keep the in-circle determinant below 2^61.
 constexpr std::int64_t kLargestCoordinate = 1 << 14;
@@ -130,15 +129,16 @@ const std::vector<DelaunayTriangle>& Delaunay::triangulate(const std::vector<Eig
                                 ", expected 1..16000 each");
   }
   start(width, height);
-  points_.resize(kCorners + points.size());
+  const int corners = static_cast<int>(points_.size());  // of the enclosing box
+  points_.resize(corners + points.size());
   face_from_.assign(points_.size(), -1);
   faces_.reserve(2 * points_.size() + 8);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2f& q = points[i];
     if (!(q.x() >= 0 && q.y() >= 0 && q.x() < float(width) && q.y() < float(height))) continue;
-    points_[kCorners + i] = {std::llround((double(q.x()) + kMargin) * double(scale_)),
-                             std::llround((double(q.y()) + kMargin) * double(scale_))};
-    insert(kCorners + static_cast<int>(i));
+    points_[corners + i] = {std::llround((double(q.x()) + kMargin) * double(scale_)),
+                            std::llround((double(q.y()) + kMargin) * double(scale_))};
+    insert(corners + static_cast<int>(i));
   }
 
   // Faces that touch the box's corners are not part of the result.
@@ -147,10 +147,9 @@ const std::vector<DelaunayTriangle>& Delaunay::triangulate(const std::vector<Eig
   result_.clear();
   for (std::size_t f = 0; f < faces_.size(); ++f) {
     const Face& face = faces_[f];
-    if (!face.alive || face.vertex[0] < kCorners || face.vertex[1] < kCorners || face.vertex[2] < kCorners) continue;
+    if (!face.alive || face.vertex[0] < corners || face.vertex[1] < corners || face.vertex[2] < corners) continue;
     number[f] = static_cast<int>(result_.size());
-    result_.push_back(
-        {{face.vertex[0] - kCorners, face.vertex[1] - kCorners, face.vertex[2] - kCorners}, face.neighbour});
+    result_.push_back({{face.vertex[0] - corners, face.vertex[1] - corners, face.vertex[2] - corners}, face.neighbour});
   }
   for (DelaunayTriangle& t : result_) {
     for (int& g : t.neighbour) g = g < 0 ? -1 : number[g];
