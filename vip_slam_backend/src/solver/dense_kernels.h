@@ -3,14 +3,13 @@
 #pragma once
 
 #include "instruction_set.h"
+#include "kernel_lanes.h"
 
 namespace vip_slam {
 
 struct FrontSegment;
 
-/// Rows that must be readable (and zero) below the last one of every panel given to the kernels.
-constexpr int kKernelPadding = 8;
-
+/// kKernelLanes rows must be readable (and zero) below the last one of every panel given to the kernels.
 struct DenseKernels {
   /// Cholesky of the leading c x c block of the n x n lower matrix A (leading dimension ld), rows below become L21.
   /// False when a pivot is not positive. The entries above the diagonal are overwritten.

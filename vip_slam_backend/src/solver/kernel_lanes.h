@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Kernels of plane and IMU factors work on batches of factors side by side.
+// How many numbers the kernels take side by side, whatever the width of the processor's vectors.
 #pragma once
 
 namespace vip_slam {
 
-/// Factors per batch; the last batch is padded with copies of any factor.
+/// Factors per batch (the last one is padded with copies of any factor), and rows or columns per block of a matrix.
 constexpr int kKernelLanes = 8;
 
 }  // namespace vip_slam

@@ -24,6 +24,8 @@ struct KernelFrame {
   std::int32_t unknown = 0;  ///< first unknown of the pose
 };
 
+/// Least diagonal of J^T J for the damping, so that what nothing measures stays where it is.
+constexpr double kMinDiagonal = 1e-6;
 /// Per frame: a 6 x 6 block (columns of 8) and a gradient of 6, padded.
 constexpr int kFrameSums = 56;
 
@@ -35,7 +37,7 @@ struct PointKernelArguments {
   const double* points = nullptr;               ///< 3 per point
   const std::uint32_t* pair_offset = nullptr;   ///< [earlier * frame_count + later]: offset of the block in the values
   double huber = 0, depth_huber = 0;
-  double inverse_radius = 0;     ///< damping: clamp(diag) * inverse_radius
+  double inverse_radius = 0;     ///< damping: max(diag, kMinDiagonal) * inverse_radius
   double* values = nullptr;      ///< reduced matrix, lower blocks; added to
   double* frame_sums = nullptr;  ///< kFrameSums per frame: J^T J and J^T r of the pose; added to
   double* eliminated = nullptr;  ///< 8 per frame: W V^-1 g; added to
@@ -44,7 +46,7 @@ struct PointKernelArguments {
   double* W = nullptr;               ///< per observation 3 columns of 8: J_pose^T J_point
   double* point_system = nullptr;    ///< per point 6: J_point^T J_point (xx, xy, xz, yy, yz, zz)
   double* point_gradient = nullptr;  ///< per point 3: J_point^T r
-  double* point_damping = nullptr;   ///< per point 3: clamp(diag) * inverse_radius
+  double* point_damping = nullptr;   ///< per point 3: max(diag, kMinDiagonal) * inverse_radius
 };
 
 struct PointKernels {

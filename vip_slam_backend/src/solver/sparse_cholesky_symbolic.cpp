@@ -36,8 +36,7 @@ void SparseCholesky::splitTree() {
     if (parent[f] < 0) open.emplace_back(cost[f], f);
   double above = 0, best = std::numeric_limits<double>::infinity();
   std::vector<int> best_part(n, 2);
-  constexpr int kMaxOpened = 64;
-  for (int opened = 0; !open.empty() && opened < kMaxOpened; ++opened) {
+  while (!open.empty() && above < best) {
     std::sort(open.begin(), open.end());
     double sum[2] = {0, 0};
     std::vector<int> part(n, 2);
@@ -91,7 +90,7 @@ void SparseCholesky::placeUpdates() {
     }
     base = top;
   }
-  updates_.resize(base + kKernelPadding);
+  updates_.resize(base + kKernelLanes);
 }
 
 /// Supernodes: consecutive nodes of the elimination that are factorised as one front. Indexed by front:
@@ -189,7 +188,7 @@ void SparseCholesky::layFronts(const Lists& structure, Supernodes* supernodes) {
       if (p <= last) front.columns += sizeAt(p);
     }
     ++front.rows;  // the right-hand side
-    front.ld = (front.rows + kKernelPadding + 7) / 8 * 8;
+    front.ld = (front.rows + kKernelLanes + 7) / 8 * 8;
     if (front.ld % 64 == 0) front.ld += 8;  // so that columns do not map to the same cache sets
     front.factor_offset = factor_size_;
     factor_size_ += static_cast<std::size_t>(front.ld) * front.columns;
@@ -272,7 +271,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   placeUpdates();
   placeBlocks(pairs, &supernodes);
   factor_.resize(factor_size_);
-  work_.assign(dimension_ + kKernelPadding, 0.0);
+  work_.assign(dimension_ + kKernelLanes, 0.0);
 }
 
 }  // namespace vip_slam

@@ -6,11 +6,6 @@
 #include "structured_solver.h"
 
 namespace vip_slam {
-namespace {
-
-constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;
-
-}  // namespace
 
 // The result is bit-identical for any number of threads: each number is the same sum in the same order, since a thread
 // adds either to its own arrays (the points' sums over frames) or to a part of the matrix that no other thread touches.
@@ -22,7 +17,7 @@ void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker
   eliminated_.fillZero();
   const PointKernelArguments a = arguments(problem, radius);
   if (!ahead_)
-    worker->share(1 + kPointParts, [&](int piece) {
+    worker->share(1 + SystemStructure::kPointParts, [&](int piece) {
       if (piece == 0)
         linearizeFactors(problem);
       else
@@ -36,7 +31,7 @@ void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker
       part.later_begin = structure_.range_begin[range].data();
       part.later_end = structure_.range_begin[range + 1].data();
     }
-    pointKernels(instruction_set_).eliminate(part, 0, structure_.part_begin[kPointParts]);
+    pointKernels(instruction_set_).eliminate(part, 0, structure_.part_begin[SystemStructure::kPointParts]);
   });
   addPoints();
   damp(radius);
@@ -71,7 +66,7 @@ void StructuredSolver::addPoints() {
   gradient_ = full_gradient_;
   for (std::size_t f = 0; f < frames_.size(); ++f) {
     if (frames_[f].diagonal < 0) continue;
-    static_assert(kPointParts == 2, "two sums");
+    static_assert(SystemStructure::kPointParts == 2, "two sums");
     const double *sums = frame_sums_[0].data() + kFrameSums * f, *more = frame_sums_[1].data() + kFrameSums * f;
     const double* eliminated = eliminated_.data() + 8 * f;
     double* block = values_.data() + frames_[f].diagonal;
@@ -91,7 +86,7 @@ void StructuredSolver::damp(double radius) {
   forEachNode([&](int size, int unknown, double* block) {
     const int ld = SparseCholesky::leading(size);
     for (int k = 0; k < size; ++k) {
-      damping_[unknown + k] = std::clamp(diagonal_[unknown + k], kMinDiagonal, kMaxDiagonal) / radius;
+      damping_[unknown + k] = std::max(diagonal_[unknown + k], kMinDiagonal) / radius;
       block[k * ld + k] += damping_[unknown + k];
     }
   });

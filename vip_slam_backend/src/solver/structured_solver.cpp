@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace vip_slam {
@@ -14,16 +15,14 @@ double ms(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
 
-constexpr double kMaxRadius = 1e16, kMinRadius = 1e-32, kMinRatio = 1e-3;
-
 }  // namespace
 
 double StructuredSolver::cost(const BaProblem& problem, bool ahead, Worker* worker) {
   loadFrames(problem);
   const PointKernelArguments a = arguments(problem, 1);
   const auto start = Clock::now();
-  double parts[1 + kPointParts];
-  worker->share(1 + kPointParts, [&](int piece) {
+  double parts[1 + SystemStructure::kPointParts];
+  worker->share(1 + SystemStructure::kPointParts, [&](int piece) {
     const int part = piece - 1;
     if (piece == 0)
       parts[piece] = ahead ? linearizeFactors(problem) : factorCost(problem);
@@ -44,10 +43,10 @@ bool StructuredSolver::solveStep(const BaProblem& problem, double radius, Worker
   if (!structure_.cholesky.solve(values_.data(), step_.data(), worker)) return false;
   const PointKernelArguments a = arguments(problem, radius);
   const int points = static_cast<int>(points_.size() / 3);
-  constexpr int kPieces = 8;
-  worker->share(kPieces, [&](int piece) {
+  worker->share(SystemStructure::kRanges, [&](int piece) {
     pointKernels(instruction_set_)
-        .backSubstitute(a, step_.data(), point_step_.data(), points * piece / kPieces, points * (piece + 1) / kPieces);
+        .backSubstitute(a, step_.data(), point_step_.data(), points * piece / SystemStructure::kRanges,
+                        points * (piece + 1) / SystemStructure::kRanges);
   });
   for (const double v : step_)
     if (!std::isfinite(v)) return false;
@@ -112,14 +111,15 @@ StructuredSolver::Step StructuredSolver::stepAt(const BaProblem& problem, double
 }
 
 void StructuredSolver::TrustRegion::accept(double ratio) {
-  radius = std::min(kMaxRadius, radius / std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * ratio - 1.0, 3)));
+  radius /= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * ratio - 1.0, 3));
   decrease_factor = 2;
 }
 
 bool StructuredSolver::TrustRegion::refuse() {
   radius /= decrease_factor;
   decrease_factor *= 2;
-  return radius >= kMinRadius;
+  // With a smaller one the step vanishes in the rounding of the states.
+  return radius >= std::numeric_limits<double>::epsilon();
 }
 
 double StructuredSolver::largestGradient() const {
@@ -147,7 +147,7 @@ StructuredSolver::Trial StructuredSolver::tryStep(BaProblem& problem, const Solv
   const double decrease = present - trial.cost;
   trial.ratio = decrease / predicted;
   const double least = options.function_tolerance * present;
-  trial.accepted = std::isfinite(trial.cost) && trial.ratio > kMinRatio;
+  trial.accepted = std::isfinite(trial.cost) && trial.ratio > 0;
   if (trial.accepted) {
     trial.converged = decrease <= least || trial.step_norm < options.parameter_tolerance;
   } else {

@@ -112,8 +112,7 @@ class StructuredSolver : public BaSolver {
   std::vector<double> homography_sums_, point_to_plane_sums_;
   std::vector<KernelImu> imu_;
   std::vector<double> imu_constants_, imu_states_, imu_frames_;
-  static constexpr int kPointParts = SystemStructure::kPointParts;
-  KernelArray values_, W_, frame_sums_[kPointParts], eliminated_;
+  KernelArray values_, W_, frame_sums_[SystemStructure::kPointParts], eliminated_;
   std::vector<double> points_, gradient_, full_gradient_, diagonal_, damping_, point_system_, point_gradient_,
       point_damping_, step_, point_step_;
 };

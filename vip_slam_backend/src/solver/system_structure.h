@@ -32,7 +32,8 @@ class SystemStructure {
   /// linearised in parallel, each with its own sums over the frames, independent of the number of threads.
   static constexpr int kPointParts = 2;
   int part_begin[kPointParts + 1] = {};
-  /// Ranges of the elimination order in which the elimination of points costs the same: per point its first observation
+  /// Pieces of what any number of threads may share; ranges of the elimination order in which the elimination of points
+  /// costs the same: per point its first observation
   /// (in `sorted`) in each range, and finally the end of its observations.
   static constexpr int kRanges = 4;
   std::vector<int> range_begin[kRanges + 1];
