@@ -8,21 +8,20 @@
 #include <Eigen/Eigenvalues>
 
 #include "../util/union_find.h"
+#include "vip_slam_backend/factors/homography.h"
 
 namespace vip_slam {
 namespace {
 
-// Least eigenvalue of the sum of n n^T over shared planes: 0.1 is a third plane 18 degrees off those spanned by the
-// other two.
-constexpr double kSpans = 0.1;
-
+// Least eigenvalue of the sum of n n^T over shared planes: how far a third plane is off those spanned by two others.
 bool spanSpace(const BaProblem& problem, const std::set<int>& a, const std::set<int>& b) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const int plane : a) {
     const Eigen::Vector3d& n = problem.planes[plane].plane.n;
     if (b.count(plane)) sum += n * n.transpose();
   }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum, Eigen::EigenvaluesOnly).eigenvalues()[0] > kSpans;
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum, Eigen::EigenvaluesOnly).eigenvalues()[0] >
+         kMinIncidence * kMinIncidence;
 }
 
 void joinByPlanes(const BaProblem& problem, UnionFind* parts) {

@@ -5,15 +5,11 @@
 #include <cmath>
 #include <cstddef>
 
+#include "vip_slam_backend/factors/reprojection.h"
 #include "vip_slam_core/types/sliding_tracks.h"
 
 namespace vip_slam {
 namespace {
-
-constexpr double kMinDepth = 0.05, kMaxApart = 4.0;
-
-// Prefetch distances, in landmarks: of the landmark itself, the list of its observations, their features.
-constexpr std::size_t kAheadLandmark = 12, kAheadList = 8, kAheadFeatures = 4;
 
 void prefetch(const void* p, std::size_t bytes) {
   const char* at = static_cast<const char*>(p);
@@ -23,7 +19,7 @@ void prefetch(const void* p, std::size_t bytes) {
 
 double depthIn(const Map& map, KeyframeId keyframe, const Eigen::Vector3d& p_W) {
   const SE3 T_W_C = map.keyframe(keyframe).T_W_C();
-  return std::max(kMinDepth, T_W_C.R().col(2).dot(p_W - T_W_C.t()));
+  return std::max(kMinProjectionDepth, T_W_C.R().col(2).dot(p_W - T_W_C.t()));
 }
 
 }  // namespace
@@ -58,14 +54,14 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
   points_.reserve(landmarks.size());
   views_.reserve(most);
   const std::size_t count = landmarks.size();
-  for (std::size_t l = 0; l < count; ++l) {
-    if (l + kAheadLandmark < count) prefetch(landmarks[l + kAheadLandmark], sizeof(MapLandmark));
-    if (l + kAheadList < count) {
-      const auto& list = landmarks[l + kAheadList]->observations;
+  for (std::size_t l = 0; l < count; ++l) {  // prefetched: the landmark, the list of its observations, their features
+    if (l + 3 * kAhead < count) prefetch(landmarks[l + 3 * kAhead], sizeof(MapLandmark));
+    if (l + 2 * kAhead < count) {
+      const auto& list = landmarks[l + 2 * kAhead]->observations;
       prefetch(list.data(), list.size() * sizeof(MapObservation));
     }
-    if (l + kAheadFeatures < count) {
-      collect(*landmarks[l + kAheadFeatures]);
+    if (l + kAhead < count) {
+      collect(*landmarks[l + kAhead]);
       for (const Seen& s : seen_) prefetch(s.feature, offsetof(Feature, descriptor));
     }
     collect(*landmarks[l]);
@@ -75,7 +71,7 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
 }
 
 double LandmarkViews::cornersApart(const Track& a, const Track& b, double depth) {
-  return std::min(kMaxApart, std::hypot(a.first_depth, b.first_depth) / depth);
+  return std::hypot(a.first_depth, b.first_depth) / depth;
 }
 
 void LandmarkViews::collect(const MapLandmark& landmark) {

@@ -26,6 +26,9 @@ struct LandmarkView {
   bool slides = false;    ///< belongs to a track that slides with the motion
 };
 
+/// Landmarks by which one stage of prefetching is ahead of the next.
+constexpr std::size_t kAhead = 4;
+
 class LandmarkViews {
  public:
   /// Points of the landmarks that a free keyframe sees, ascending by landmark; their views by the problem's frames,

@@ -10,13 +10,10 @@
 #include "vip_slam_backend/solver/robust.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"
+#include "vip_slam_core/util/significance.h"
 
 namespace vip_slam {
 namespace {
-
-// At true poses half of the pairs of a track have less than half of the expected error, and a few per cent several
-// times as much: so the sigma of the core is reduced (kCore), with a redescending loss for the tail (kTail, sigmas).
-constexpr double kCore = 0.6, kTail = 3.0;
 
 // Prior of a track's variance: equivalent to this many squared errors of the expected size.
 constexpr double kTrackFreedom = 4.0;
@@ -46,8 +43,7 @@ PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope
 // Views by one keyframe of the landmarks with one host on one plane.
 struct PlaneFactorBuilder::Observer {
   int frame = 0, pairs = 0;
-  bool usable = true;  // far enough from the plane
-  Vector9d h;          // vec(H) at the present estimate
+  Vector9d h;  // vec(H) at the present estimate
   HomographySums sums{};
   std::vector<HomographyPair> uncompressed;
 };
@@ -97,7 +93,6 @@ int PlaneFactorBuilder::observerOf(int frame, int host, const Plane& plane, std:
     place = static_cast<int>(observers->size());
     Observer observer;
     observer.frame = frame;
-    observer.usable = std::abs(plane.signedDistance(geometry_[frame].t_W_C)) >= kMinPlaneDistance;
     observer.h = homographyVector(geometry_[host], geometry_[frame], plane);
     observers->push_back(observer);
   }
@@ -128,25 +123,20 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     const Observer& observer = (*observers)[place];
     const Eigen::Vector3d p = transfer(observer.h, xy_i);
     const double rho = p.z();
-    // An observer may see the plane edge-on, unlike a host: the host's noise shrinks on the way there.
-    if (!observer.usable || rho < kMinDepthRatio || rho > kMaxDepthRatio) {
-      refused_.push_back(v);
-      continue;
-    }
-    // The pair's variance: the observer's plus the host's transferred into the observer.
+    // The pair's variance: the observer's plus the host's transferred into the observer, on the way to which it shrinks
+    // where that sees the plane edge-on.
     const double gain = hostNoiseGain(observer.h, p);
     const double own = square(v->sigma) * inflation;
     const double variance = own + gain * host_variance, judged = std::max(own, gate) + gain * host_judged;
     // After compression outliers cannot be down-weighted: gate and weight here, at the present estimate.
     const Eigen::Vector2d xy_j = v->xy.cast<double>();
     const double error = (p.head<2>() - rho * xy_j).squaredNorm() / (rho * rho);
-    if (error > options.outlier_chi2 * judged) {
+    if (!(rho > 0) || error > options.outlier_chi2 * judged) {
       refused_.push_back(v);
       continue;
     }
-    const double scale = options.huber > 0 && v->own_track ? kCore : 1.0;
-    const double squared = error / (scale * scale * variance);
-    const double weight = redescendingScale(squared, kTail * options.huber) / (scale * std::sqrt(variance) * rho);
+    const double squared = error / variance;
+    const double weight = redescendingScale(squared, kNoiseSigmas * options.huber) / (std::sqrt(variance) * rho);
     pairs_.push_back({place, {xy_i, xy_j, weight}, v->own_track, squared});
   }
   if (tried == 0 || 2 * static_cast<int>(refused_.size()) > tried) return false;

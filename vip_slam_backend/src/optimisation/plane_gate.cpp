@@ -10,16 +10,15 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kGoodFit = 1.5;    // mean squared residual, sigmas^2, up to which all points are kept unchecked
-constexpr double kFarthest = 0.05;  // metres
+constexpr double kFarthest = 0.05;               // metres
 constexpr double kMaxNear = 0.5, kMaxFar = 0.9;  // shares that must be kept, with the median within kFarthest or not
 
 }  // namespace
 
 PlaneGate::PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d& plane_C) : observation_(observation) {
   const std::vector<PlaneSample>& points = observation.points;
-  if (points.empty() || plane_C.dot(observation.G * plane_C) <= kGoodFit * observation.weight_scale * points.size())
-    return;
+  // With residuals as small as the noise there is nothing to remove.
+  if (points.empty() || plane_C.dot(observation.G * plane_C) <= observation.weight_scale * points.size()) return;
   std::vector<double> distance;
   for (const PlaneSample& p : points) distance.push_back(plane_C.dot(p.p_C.cast<double>().homogeneous()));
   const double median = upperMedian(distance);

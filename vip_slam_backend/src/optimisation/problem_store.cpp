@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "landmark_views.h"
 #include "plane_intersection.h"
 #include "vip_slam_backend/factors/reprojection.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
@@ -39,7 +40,6 @@ constexpr double kGross = 10.0;
 
 void storePlanePoints(const BuiltProblem& built, Map* map, LandmarkSet* done) {
   // Prefetch features a few landmarks ahead, since they are scattered over the keyframes.
-  constexpr std::size_t kAhead = 4;
   std::vector<const MapLandmark*> landmarks;
   landmarks.reserve(built.plane_points.size());
   for (const LandmarkId id : built.plane_points) {
@@ -62,21 +62,12 @@ bool isInlier(const FrameGeometry& frame, const BaObservation& b, const Eigen::V
   return reprojectionResidual(frame, p_W, Eigen::Vector2d(b.x, b.y), weight, &r) && r.squaredNorm() <= chi2;
 }
 
-// Without a way between the cameras a homography is the same for all planes.
-bool hasParallax(const BaProblem& problem, int i, int j, int plane) {
-  constexpr double kMinParallax = 0.01;  // of the plane's distance
-  const Eigen::Vector3d from = problem.frames[i].T_W_C().t(), to = problem.frames[j].T_W_C().t();
-  return (to - from).norm() > kMinParallax * std::abs(problem.planes[plane].plane.signedDistance(from));
-}
-
 }  // namespace
 
 std::vector<char> heldPlanes(const BaProblem& problem) {
   std::vector<char> held(problem.planes.size(), 0);
   for (const BaPointToPlane& f : problem.point_to_plane) held[f.plane] = 1;
   for (const BaPlaneSample& f : problem.plane_samples) held[f.plane] = 1;
-  for (const BaHomography& f : problem.homographies) held[f.plane] |= hasParallax(problem, f.i, f.j, f.plane);
-  for (const BaHomographyPair& f : problem.homography_pairs) held[f.plane] |= hasParallax(problem, f.i, f.j, f.plane);
   return held;
 }
 
@@ -116,21 +107,21 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
 std::vector<RefusedView> removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
   const BaProblem& problem = built.problem;
   const std::vector<FrameGeometry> geometry = frameGeometry(problem);
-  const auto fits = [&](const BaObservation& b, const Eigen::Vector3d& p_W, double most) {
-    return isInlier(geometry[b.frame], b, p_W, built.gate_weight, most);
-  };
   std::vector<RefusedView> removed;
   for (std::size_t p = 0; p < problem.points.size(); ++p) {
     const BaPoint& point = problem.points[p];
     for (int o = point.first; o < point.first + point.count && map->hasLandmark(built.points[p]); ++o) {
-      if (fits(problem.observations[o], point.p_W, chi2)) continue;
+      const BaObservation& b = problem.observations[o];
+      if (isInlier(geometry[b.frame], b, point.p_W, built.gate_weight, chi2)) continue;
       map->removeObservation(built.points[p], built.observations[o].keyframe);
-      removed.push_back({built.points[p], built.observations[o].keyframe, problem.observations[o]});
+      removed.push_back({built.points[p], built.observations[o].keyframe, b});
     }
   }
   for (const RefusedView& view : built.refused) {
     const MapLandmark* landmark = map->findLandmark(view.landmark);
-    if (!landmark || fits(view.observation, landmark->p_W, kGross * chi2)) continue;
+    if (!landmark ||
+        isInlier(geometry[view.observation.frame], view.observation, landmark->p_W, built.gate_weight, kGross * chi2))
+      continue;
     map->removeObservation(view.landmark, view.keyframe);
     removed.push_back(view);
   }

@@ -12,9 +12,8 @@ namespace vip_slam {
 inline bool depthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane, const Eigen::Vector2d& xy_i,
                        double* rho) {
   if (!mayHost(i.R_C_W * plane.n, plane.signedDistance(i.t_W_C), xy_i)) return false;
-  if (std::abs(plane.signedDistance(j.t_W_C)) < kMinPlaneDistance) return false;
   *rho = transfer(homographyVector(i, j, plane), xy_i).z();
-  return *rho >= kMinDepthRatio && *rho <= kMaxDepthRatio;
+  return *rho > 0;
 }
 
 }  // namespace vip_slam

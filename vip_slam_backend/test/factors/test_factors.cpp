@@ -187,8 +187,8 @@ TEST(Factors, WeakHomographiesAreRefused) {
       j(SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.3, 0, 0)), identity);
   double rho;
   EXPECT_TRUE(depthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 2), Eigen::Vector2d(0, 0), &rho));
-  // Camera nearly in the plane; ray nearly along it; plane behind.
-  EXPECT_FALSE(depthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 0.1), Eigen::Vector2d(0, 0), &rho));
+  // Point at the camera; ray nearly along it; plane behind.
+  EXPECT_FALSE(depthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 0.04), Eigen::Vector2d(0, 0), &rho));
   EXPECT_FALSE(depthRatio(i, j, Plane(Eigen::Vector3d(0, -1, -0.05), 2), Eigen::Vector2d(0, 0), &rho));
   EXPECT_FALSE(depthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), -2), Eigen::Vector2d(0, 0), &rho));
 }

@@ -55,24 +55,3 @@ TEST(ProblemStore, APlaneThatNoFactorHoldsIsNotOptimised) {
   for (std::size_t p = 0; p < built.planes.size(); ++p)
     EXPECT_EQ(map.planes().at(built.planes[p]).optimised, static_cast<int>(p) == held);
 }
-
-TEST(ProblemStore, AHomographyHoldsItsPlaneByParallax) {
-  BaProblem problem;
-  problem.planes.resize(2);
-  for (BaPlane& plane : problem.planes) plane.plane = Plane(Eigen::Vector3d(0, 0, -1), 3);
-  problem.frames.resize(3);
-  problem.frames[1].state.T_W_I.t().x() = 0.02;
-  problem.frames[2].state.T_W_I.t().x() = 0.04;
-  BaHomography near, far;
-  near.i = far.i = 0;
-  near.j = 1, far.j = 2;
-  near.plane = 0, far.plane = 1;
-  problem.homographies = {near, far};
-  EXPECT_EQ(heldPlanes(problem), (std::vector<char>{0, 1}));
-  problem.planes[1].plane.d = 12;  // where it has drifted to
-  EXPECT_EQ(heldPlanes(problem), (std::vector<char>{0, 0}));
-  BaHomographyPair pair;
-  pair.i = 0, pair.j = 2, pair.plane = 0;
-  problem.homography_pairs = {pair};
-  EXPECT_EQ(heldPlanes(problem), (std::vector<char>{1, 0}));
-}

@@ -116,20 +116,18 @@ TEST(WeakHomographies, AHostEdgeOnIsRefused) {
   }
 }
 
-TEST(WeakHomographies, ACameraOnThePlaneIsRefusedAsHostAndAsObserver) {
+TEST(WeakHomographies, ACameraOnThePlaneIsNoHostAndHarmless) {
   for (const bool shared : {false, true})
-    for (const double distance : {0.0, 1e-12, 1e-3, 0.14, -0.14}) {
+    for (const double distance : {0.0, 1e-12, 1e-3, 0.14}) {
       Wall wall;
       wall.settings.shared_hosts = shared;
       wall.lookFrom(0, edgeOn(distance));
       wall.lookFrom(6, edgeOn(distance));
       BuiltProblem problem = built(wall);
       EXPECT_EQ(pairsOf(problem.problem, 0, -1) + pairsOf(problem.problem, 6, -1), 0) << distance;
-      EXPECT_EQ(pairsOf(problem.problem, -1, 0) + pairsOf(problem.problem, -1, 6), 0) << distance;
-      EXPECT_EQ(pairsOf(problem.problem, -1, -1), Wall::kLandmarks * (Wall::kKeyframes - 3)) << distance;
+      EXPECT_EQ(pairsOf(problem.problem, -1, -1), Wall::kLandmarks * (Wall::kKeyframes - 1)) << distance;
       EXPECT_TRUE(isFinite(problem.problem)) << distance;
       // The views are correct, and stay in the map.
-      EXPECT_EQ(problem.refused.size(), static_cast<std::size_t>(2 * Wall::kLandmarks)) << distance;
       storeProblem(problem, ImuNoise(), &wall.map);
       EXPECT_TRUE(removeOutliers(problem, wall.settings.measurement.outlier_chi2, &wall.map).empty()) << distance;
     }

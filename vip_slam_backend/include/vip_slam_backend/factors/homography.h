@@ -11,7 +11,7 @@
 
 #include <Eigen/Core>
 
-#include "vip_slam_backend/factors/frame_geometry.h"
+#include "vip_slam_backend/factors/reprojection.h"
 #include "vip_slam_core/geometry/plane.h"
 
 namespace vip_slam {
@@ -30,19 +30,15 @@ struct HomographyPair {
 Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
                           const Eigen::Matrix<double, 3, 2>* basis = nullptr, HomographyJacobian* J = nullptr);
 
-/// The geometry of a homography is too weak for a factor with a camera nearer to the plane than this, metres, ...
-constexpr double kMinPlaneDistance = 0.15;
-/// ... or with a depth ratio outside these limits, a host's ray within 10 degrees of the plane (sine), or a point depth
-/// below kMinPlaneDepth, metres.
-constexpr double kMinDepthRatio = 0.25, kMaxDepthRatio = 4.0, kMinIncidence = 0.1736, kMinPlaneDepth = 0.05;
+/// The geometry is too weak within 10 degrees of the degenerate one (sine): a host's ray along the plane.
+constexpr double kMinIncidence = 0.1736;
 
 /// Whether a camera with normal `n_C` of a plane in its axes, at signed `distance` from it, may be the host of its
-/// point at xy (above): far enough from the plane, the ray not along it, the point before the camera.
+/// point at xy (above): the ray not along the plane, the point before the camera.
 inline bool mayHost(const Eigen::Vector3d& n_C, double distance, const Eigen::Vector2d& xy) {
   const double incidence = n_C.dot(xy.homogeneous());
-  return std::abs(distance) >= kMinPlaneDistance &&
-         incidence * incidence >= kMinIncidence * kMinIncidence * (xy.squaredNorm() + 1.0) &&
-         -distance / incidence >= kMinPlaneDepth;
+  return incidence * incidence >= kMinIncidence * kMinIncidence * (xy.squaredNorm() + 1.0) &&
+         -distance / incidence >= kMinProjectionDepth;
 }
 
 /// H p_i for p_i = (xy_i, 1); the third entry is the depth ratio.

@@ -57,8 +57,8 @@ struct BuilderSettings {
 
 BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings);
 
-/// Per plane of a problem, whether some measurement constrains it. Other planes have at most the prior of their kind:
-/// the window saw them, but all their depth was gated, and their homographies have no parallax.
+/// Per plane of a problem, whether depth constrains it. Other planes have at most homographies and the prior of their
+/// kind: the window saw them, but all their depth was gated.
 std::vector<char> heldPlanes(const BaProblem& problem);
 
 /// Writes the optimised variables back to the map. Landmarks that were no variables follow: plane points are
