@@ -46,7 +46,7 @@ class BackEnd {
   /// map as it was: the update then has no keyframes and lastRefusal() says why.
   MapUpdate addKeyframe(KeyframePtr keyframe);
   const std::string& lastRefusal() const;
-  /// Why keyframes, planes and observations were refused since the last call, oldest first, at most the last hundred.
+  /// Why keyframes, planes and observations were refused since the last call, oldest first, at most the last thousand.
   std::vector<std::string> takeRefusals();
   /// What was bridged instead of refused since the last call, such as a hole in a keyframe's IMU samples; likewise.
   std::vector<std::string> takeNotices();

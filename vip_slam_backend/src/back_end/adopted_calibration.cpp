@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "adopted_calibration.h"
 
-#include <algorithm>
-#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -11,39 +9,28 @@
 #include "vip_slam_core/depth/disparity_curve.h"
 
 namespace vip_slam::backend {
-namespace {
-
-// Smaller changes of the camera's correction are adopted only with the next global adjustment.
-constexpr double kNewDepthOffset = 0.001;    // m
-constexpr double kNewBearing = 1e-4;         // per entry of the matrix, normalised coordinates
-constexpr double kNewDepthShift = 0.02;      // px
-constexpr std::uint64_t kLeastWait = 4;      // keyframes
-constexpr double kNewGyroCorrection = 5e-4;  // per entry of the matrix
-
-}  // namespace
 
 bool AdoptedCalibration::follow(const CameraCorrection& newest, std::uint64_t keyframes, Map* map) {
   if (newest.curve != camera_.curve) return false;  // it refers to readings with another curve
   newest_camera_ = newest;
-  // The front end's values move with every second of data, the first ones most. An adjustment to new ones is due with
-  // half as many keyframes again.
-  const std::uint64_t wait = std::max(kLeastWait, keyframes_at_change_ / 2);
-  if (keyframes_at_change_ > 0 && keyframes < keyframes_at_change_ + wait) return false;
-  if (newest.scale == camera_.scale && std::abs(newest.offset - camera_.offset) < kNewDepthOffset &&
-      (newest.bearing.value - camera_.bearing.value).cwiseAbs().maxCoeff() < kNewBearing &&
-      (newest.shift.px - camera_.shift.px).cwiseAbs().maxCoeff() < kNewDepthShift)
-    return false;
-  keyframes_at_change_ = keyframes;
+  if (newest == camera_ || !isDue(keyframes, &keyframes_at_camera_)) return false;
   camera_ = newest;
   map->adoptCameraCorrection(camera_);
   return true;
 }
 
-bool AdoptedCalibration::followGyro(const Eigen::Matrix3d& newest, const ImuNoise& noise, Map* map) {
+bool AdoptedCalibration::followGyro(const Eigen::Matrix3d& newest, std::uint64_t keyframes, const ImuNoise& noise,
+                                    Map* map) {
   newest_gyro_ = newest;
-  if ((newest - gyro_).cwiseAbs().maxCoeff() < kNewGyroCorrection) return false;
+  if (newest == gyro_ || !isDue(keyframes, &keyframes_at_gyro_)) return false;
   gyro_ = newest;
   map->adoptGyroCorrection(newest, noise);
+  return true;
+}
+
+bool AdoptedCalibration::isDue(std::uint64_t keyframes, std::uint64_t* at_change) {
+  if (2 * keyframes < 3 * *at_change) return false;
+  *at_change = keyframes;
   return true;
 }
 
@@ -55,7 +42,7 @@ bool AdoptedCalibration::learnDepthCurve(const DepthNoise& noise, bool disparity
     error = fitDisparityError(*map, noise, disparity_error_ != 0);
     if (error) found = disparityCurve(*error, noise.max_range);
   } else {
-    found = fitDepthCurve(*map, noise, !camera_.curve.added.empty());
+    found = fitDepthCurve(*map, noise);
   }
   if (!found) return false;
   DepthCurve curve = chained(camera_.curve, *found);

@@ -15,8 +15,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::uint64_t kScaleInterval = 30, kCurveInterval = 20;  // keyframes
-constexpr int kAdjustmentsAtEnd = 3;  // at most, while the estimated depth curve still changes
+constexpr std::uint64_t kLearnInterval = 20;  // keyframes
 
 }  // namespace
 
@@ -63,7 +62,8 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // An adjustment under way has the old readings.
   if (calibration.follow(keyframe->frame.camera_correction, report.statistics.keyframes_received, &map))
     global.startOver();
-  if (calibration.followGyro(keyframe->gyro_correction, sensor.imu_noise, &map)) global.startOver();
+  if (calibration.followGyro(keyframe->gyro_correction, report.statistics.keyframes_received, sensor.imu_noise, &map))
+    global.startOver();
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   // The place of a new odometry in the map is a guess until a loop ties it: its landmarks must not be matched with
   // older ones by chance.
@@ -134,8 +134,10 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   localBundleAdjustment(t, &update);
   cull(&update);
   closeLoop(&update);
-  if (report.statistics.keyframes_received % kScaleInterval == 0) askForScale();
-  if (report.statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global.want();
+  if (report.statistics.keyframes_received % kLearnInterval == 0) {
+    askForScale();
+    if (learnDepthCurve()) global.want();
+  }
   // Poses of keyframes that waited or were moved, and corrected depth, are new to all receivers: update everything.
   if (entering || brought || calibration.camera() != camera_before) fillGlobal(&update);
   finishUpdate(&update);
@@ -225,9 +227,7 @@ std::optional<MapUpdate> BackEnd::mapWaiting() {
 MapUpdate BackEnd::finish() {
   if (!impl_->options.global_ba.at_end || impl_->frozen()) return impl_->globalUpdate(false);
   bool moved = impl_->takeGlobal(run(startGlobalBa()));
-  for (int k = 1; k < kAdjustmentsAtEnd && impl_->learnDepthCurve(); ++k) {
-    moved = impl_->takeGlobal(run(startGlobalBa())) || moved;
-  }
+  if (impl_->learnDepthCurve()) moved = impl_->takeGlobal(run(startGlobalBa())) || moved;
   return impl_->globalUpdate(moved);
 }
 

@@ -21,7 +21,7 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
       const SE3 &then = before.at(end), &now = map.keyframe(end).state.T_W_I;
       return (then.inverse() * now).t().norm() > 0.02 || then.rotation().angularDistance(now.rotation()) > 0.005;
     };
-    global.loopClosed(map.keyframe(id).data->frame.t, moved_far(id) || moved_far(event.match));
+    global.loopClosed(moved_far(id) || moved_far(event.match));
   }
 }
 

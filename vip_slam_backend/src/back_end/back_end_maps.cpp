@@ -11,8 +11,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kRecent = 5.0;  // s after the last localisation while the odometry's drift is negligible
-
 PlaneHost hostAt(const MapKeyframe& kf) { return {kf.id(), kf.data->frame.epoch, kf.state.T_W_I * kf.T_I_C}; }
 
 }  // namespace
@@ -132,7 +130,12 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   if (known) found = relocaliser.track(map, loop_closer, *keyframe, predicted, inReferencePart());
   Relocalisation place;
   if (!found && findInMap(keyframe, &place)) found = place;
-  if (!found) return;
+  if (!found) {
+    // From here on the odometry drifts: its place is still good enough for a pose, but not to join two parts of the
+    // map.
+    if (localisation.last_found) localisation.last_found->newest = false;
+    return;
+  }
   localisation.searching = false;
   odometry.place(keyframe->frame, found->T_W_I);
   localisation.localised.push_back({keyframe->frame.t, odometry.epoch(), keyframe->frame.T_chain_C,
@@ -146,9 +149,7 @@ bool BackEnd::Impl::hasRecentLocalisation(const Keyframe& keyframe) {
     localisation.last_found.reset();
     return false;
   }
-  // Later the odometry has drifted: its place is still good enough for a pose, but not to join two parts of the map.
-  const double since = keyframe.frame.t - localisation.last_found->t;
-  return since >= 0 && since < kRecent && map.hasKeyframe(localisation.last_found->match);
+  return localisation.last_found->newest && map.hasKeyframe(localisation.last_found->match);
 }
 
 bool BackEnd::Impl::moveUnplacedPartToMap(std::uint32_t of_epoch) {

@@ -25,6 +25,7 @@ struct Localisation {
     std::uint32_t epoch = 0;
     KeyframeId match = 0;
     double t = 0;
+    bool newest = true;  ///< no keyframe since then was looked for in vain
   };
   std::optional<LastFound> last_found;
 

@@ -3,19 +3,15 @@
 
 #include <algorithm>
 
+#include "message_log.h"
+
 namespace vip_slam {
-namespace {
-
-// Number of refused loops that are kept; a day has about a hundred thousand.
-constexpr std::size_t kMaxRefused = 1000;
-
-}  // namespace
 
 void LoopJournal::add(const LoopEvent& event) {
   new_.push_back(event);
   kept_.push_back(event);
   refused_ += !event.accepted;
-  if (refused_ <= kMaxRefused) return;
+  if (refused_ <= kMostKept) return;
   kept_.erase(std::find_if(kept_.begin(), kept_.end(), [](const LoopEvent& e) { return !e.accepted; }));
   --refused_;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "vip_slam_backend/map_io/map_file.h"
 
@@ -19,11 +20,14 @@ class MapNumbers {
   void startMap() { first_ = revision_ + 1; }
 
   /// Where the ids of the next loaded map's landmarks begin: apart from those of the last ones.
-  LandmarkId loadedLandmarks() const { return kLoadedLandmarks + (loads_ % kMaxLoads) * kLoadedApart; }
+  LandmarkId loadedLandmarks() const {
+    // After so many loads their ranges are used again.
+    const std::uint64_t ranges = std::numeric_limits<LandmarkId>::max() / kLoadedApart;
+    return kLoadedLandmarks + static_cast<LandmarkId>(loads_ % ranges) * kLoadedApart;
+  }
   void loaded() { ++loads_; }
 
  private:
-  static constexpr std::uint64_t kMaxLoads = 4096;  ///< loads until ranges of ids are used again
   std::uint64_t revision_ = 0, first_ = 0, loads_ = 0;
 };
 

@@ -4,7 +4,6 @@
 namespace vip_slam {
 
 void MessageLog::add(const std::string& message) {
-  constexpr std::size_t kMostKept = 100;
   messages_.push_back(message);
   if (messages_.size() > kMostKept) messages_.erase(messages_.begin());
 }

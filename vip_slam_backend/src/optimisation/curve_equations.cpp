@@ -8,16 +8,13 @@
 #include <Eigen/Geometry>
 
 #include "vip_slam_core/depth/depth_curve.h"
+#include "vip_slam_core/util/significance.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr int kKeyframes = 200;
-constexpr double kFarthest = 12.0;         // m
-constexpr double kPlaneInformation = 1e2;  // 1/m^2, prior so that a plane with a single point is determined
-constexpr double kOutlier = 3.0;           // sigmas, scale of a redescending loss
-constexpr double kMaxOff = 0.1;            // share of the reading; a point farther off its plane uses its own reading
-constexpr double kUneven = 4.0;            // times the usual squared residual: beyond, "one plane" may be several
+constexpr double kFarthest = 12.0;  // m
 
 /// Normal equations of a plane's points: of the entries, of the plane's normal (two angles) and distance, and mixed.
 struct PlaneSystem {
@@ -74,14 +71,15 @@ void add(const PlaneSample& point, const SE3& T_W_C, const Plane& plane, const E
   const double off = (plane.n.dot(corrected) + plane.d) / along;
   // Use the depth expected from the plane instead of the noisy reading: a reading that noise makes too short would get
   // a smaller sigma and count for another entry.
-  const double z = std::abs(off) < kMaxOff * reading ? reading - off : reading;
+  const double z = reading - off;
+  if (!(z > 0) || z > question.noise.unbiasedRange()) return;
   const Eigen::Index i = entryOf(z);
-  if (!(z > 0) || z > question.noise.unbiasedRange() || i + 1 >= question.value.size()) return;
+  if (i + 1 >= question.value.size()) return;
   const double share = z / DepthCurve::kStep - static_cast<double>(i), shares[2] = {1 - share, share};
   const Eigen::Vector3d p_W = ray * (reading + between(question.value, z)) + T_W_C.t();
   const double residual = plane.n.dot(p_W) + plane.d;
   const double sigma = point.sigma * question.noise.sigma(z) / question.noise.sigma(reading);
-  const double ratio = residual / (kOutlier * sigma);
+  const double ratio = residual / (kNoiseSigmas * sigma);
   const double weight = 1.0 / (sigma * sigma * (1 + ratio * ratio) * (1 + ratio * ratio));
   const Eigen::Vector3d J(u.dot(p_W), v.dot(p_W), 1.0);
   for (int a = 0; a < 2; ++a) {
@@ -151,10 +149,10 @@ CurveEquations curveEquations(const std::vector<const MapKeyframe*>& keyframes, 
   const double usual = usualMisfit(systems);
   double squares = 0, points = 0;
   for (auto& [id, system] : systems) {
-    const double trust = std::pow(std::min(1.0, kUneven * usual / std::max(1e-12, system.misfit())), 2);
+    // A plane with larger residuals than usual may be several surfaces.
+    const double trust = system.misfit() > usual ? usual / system.misfit() : 1.0;
     squares += trust * system.squares;
     points += trust * system.points;
-    system.H.diagonal().array() += kPlaneInformation;
     const Eigen::LDLT<Eigen::Matrix3d> ldlt(system.H);
     equations.H += trust * (system.own - system.cross * ldlt.solve(system.cross.transpose()));
     equations.g += trust * (system.g_own - system.cross * ldlt.solve(system.g));

@@ -11,19 +11,27 @@
 
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_core/util/significance.h"
 
 namespace vip_slam {
 
 using PlaneSet = std::map<PlaneId, const Plane*>;
 
-/// Smallest number of keyframes for a fit.
-constexpr int kMinCurveKeyframes = 15;
+/// Keyframes are left out in so many groups to find a fit's scatter; it takes keyframes for half of them.
+constexpr int kGroups = 20;
+/// Rounds of reweighting and relinearisation.
+constexpr int kFitRounds = 4;
+/// Prior sigma of what depth is off by, m and share.
+constexpr double kDepthOffSigma = 0.02;
 
 /// This session's newest keyframes (200 at most) with depth points on planes.
 std::vector<const MapKeyframe*> newestKeyframesOnPlanes(const Map& map);
 PlaneSet allPlanes(const Map& map);
 /// Splits the planes into two sets with about equally many points.
 std::pair<PlaneSet, PlaneSet> halves(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes);
+
+/// Whether a quantity is learnt, and no noise, from its size and the sigma of all that it scatters by. False for NaN.
+inline bool isLearnt(double size, double sigma) { return size > kNoiseSigmas * sigma; }
 
 /// Number of entries of a curve over the camera's range, 12 m at most.
 int curveEntries(const DepthNoise& noise);

@@ -14,12 +14,9 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kOffsetSigma = 0.02, kScaleSigma = 0.02;  // m and share, priors of the nuisance offset and scale
-constexpr int kFitRounds = 4;                              // of reweighting and relinearisation
-constexpr int kGroups = 20;                                // of keyframes, for the jackknife
-// An error is significant above kCertain sigmas and, the first time, kFirst, 1/m, when each half of the planes gives at
-// least kMinShare of it. In maps with exact depth errors of up to 0.26 mm at one metre are estimated.
-constexpr double kCertain = 3.0, kMinShare = 0.5, kFirst = 3e-4;
+// An error is learnt above three sigmas and, the first time, kFirst, 1/m, when each half of the planes gives at least
+// kMinShare of it. In maps with exact depth errors of up to 0.26 mm at one metre are estimated.
+constexpr double kMinShare = 0.5, kFirst = 3e-4;
 constexpr double kMaxError = 0.01;  // 1/m; a centimetre at one metre is more than a calibration error
 constexpr double kFurther = 4e-5;   // 1/m; smallest further change once there is an error
 
@@ -28,7 +25,8 @@ using Keyframes = std::vector<const MapKeyframe*>;
 /// 1/m; 0 where it cannot be told.
 double fit(const Keyframes& keyframes, const PlaneSet& planes, const DepthNoise& noise) {
   const int entries = curveEntries(noise);
-  const Eigen::Vector3d prior(1 / (kOffsetSigma * kOffsetSigma), 1 / (kScaleSigma * kScaleSigma), 0);
+  const double certain = 1 / (kDepthOffSigma * kDepthOffSigma);
+  const Eigen::Vector3d prior(certain, certain, 0);
   Eigen::Vector3d x = Eigen::Vector3d::Zero();  // offset, scale, error
   for (int round = 0; round < kFitRounds; ++round) {
     Eigen::MatrixX3d J(entries, 3);
@@ -68,12 +66,12 @@ double sigmaOfFit(const Keyframes& keyframes, const PlaneSet& planes, const Dept
 std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise, bool again) {
   if (!measuresDisparity(noise.type)) return std::nullopt;
   const Keyframes keyframes = newestKeyframesOnPlanes(map);
-  if (int(keyframes.size()) < kMinCurveKeyframes) return std::nullopt;
+  if (2 * int(keyframes.size()) < kGroups) return std::nullopt;
   const PlaneSet planes = allPlanes(map);
   const double found = fit(keyframes, planes, noise);
   if (std::abs(found) > kMaxError || !(std::abs(found) > (again ? kFurther : kFirst))) return std::nullopt;
   const double sigma = sigmaOfFit(keyframes, planes, noise);
-  if (!(std::abs(found) > (again ? 1.0 : kCertain) * sigma)) return std::nullopt;
+  if (!(std::abs(found) > (again ? 1.0 : kNoiseSigmas) * sigma)) return std::nullopt;
   if (again) return found;
   // Surfaces that are not exactly planar give an error as well, but each plane a different one.
   const auto [first, second] = halves(keyframes, planes);

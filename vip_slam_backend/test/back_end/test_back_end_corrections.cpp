@@ -166,7 +166,7 @@ TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
       EXPECT_LT(worst(), 0.0006);
       EXPECT_TRUE(back_end.globalBaWanted());
       back_end.merge(back_end.run(back_end.startGlobalBa()));
-    } else {
+    } else if (k < 22) {  // again once there are half as many keyframes more
       EXPECT_FALSE(back_end.globalBaWanted());
     }
     // Plane updates may still be based on the previous correction.
@@ -202,7 +202,7 @@ TEST(BackEnd, AGyroCorrectionHoldsForAllKeyframes) {
       if (tells && k >= 15) correction = 1 / 1.05 - 1 + 1e-5 * (k - 15);
       back_end.addKeyframe(turningTooFast(world.next(), correction));
       EXPECT_EQ(back_end.lastRefusal(), "");
-      EXPECT_EQ(back_end.globalBaWanted(), tells && k == 15) << k;
+      EXPECT_EQ(back_end.globalBaWanted(), tells && (k == 15 || k == 23)) << k;
       if (back_end.globalBaWanted()) back_end.merge(back_end.run(back_end.startGlobalBa()));
       back_end.applyPlaneUpdate(world.planes());
     }
@@ -323,7 +323,7 @@ TEST(BackEnd, AWanderingCorrectionAsksForFewAdjustments) {
     back_end.merge(back_end.run(back_end.startGlobalBa()));
   }
   EXPECT_GE(adjustments, 4);
-  EXPECT_LE(adjustments, 8);
+  EXPECT_LE(adjustments, 10);
   back_end.finish();  // adopts the newest
   for (const auto& [id, kf] : back_end.map().keyframes()) EXPECT_EQ(kf.data->frame.camera_correction.bearing, bearing);
 }

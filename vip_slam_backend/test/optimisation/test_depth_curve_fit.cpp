@@ -16,11 +16,11 @@ namespace {
 constexpr double kWave = 4.1, kAmplitude = 0.004;  // a time-of-flight camera's, 1/m and m
 double wiggle(double z) { return kAmplitude * std::sin(kWave * z); }
 
-std::optional<DepthCurve> curveOf(std::function<double(double)> read_too_long, int keyframes = 60, double sigma = 0.004,
-                                  bool refine = false) {
+std::optional<DepthCurve> curveOf(std::function<double(double)> read_too_long, int keyframes = 60,
+                                  double sigma = 0.004) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(std::move(read_too_long), sigma);
-  return fitDepthCurve(mapAtTruePoses(&world, keyframes), DepthNoise(), refine);
+  return fitDepthCurve(mapAtTruePoses(&world, keyframes), DepthNoise());
 }
 
 /// RMS of the curve plus the depth error, between 2 and 6 m, after removing offset and scale.
@@ -46,21 +46,10 @@ TEST(DepthCurveFit, FindsTheWiggleOfATimeOfFlightCamera) {
   EXPECT_LT(std::abs(curve->at(8.0f)), 0.001f);
 }
 
-// What a first curve lacks may lie at few distances: too little to begin with, but enough to go on with.
-TEST(DepthCurveFit, RefinesACurveWhereItLacksSomething) {
-  const auto lacks = [](double z) { return z > 2.0 && z < 2.8 ? 0.003 * std::sin((z - 2.0) / 0.8 * M_PI) : 0.0; };
-  EXPECT_FALSE(curveOf(lacks));
-  const auto curve = curveOf(lacks, 60, 0.004, true);
-  ASSERT_TRUE(curve);
-  EXPECT_NEAR(curve->at(2.4f) - (curve->at(2.0f) + curve->at(2.8f)) / 2, -0.003, 0.0006);  // its line is open
-}
-
 TEST(DepthCurveFit, FindsNothingInWhatIsExact) {
-  for (const bool refine : {false, true}) {
-    EXPECT_FALSE(curveOf(exact, 60, 0.004, refine));
-    EXPECT_FALSE(curveOf(exact, 60, 0.0005, refine));
-    EXPECT_FALSE(curveOf(exact, 60, 0.03, refine));
-  }
+  EXPECT_FALSE(curveOf(exact, 60, 0.004));
+  EXPECT_FALSE(curveOf(exact, 60, 0.0005));
+  EXPECT_FALSE(curveOf(exact, 60, 0.03));
 }
 
 // Both are estimated elsewhere, see the header.
@@ -69,7 +58,7 @@ TEST(DepthCurveFit, LeavesOffsetAndScaleAlone) {
   EXPECT_FALSE(curveOf([](double z) { return 0.01 * z; }));
 }
 
-TEST(DepthCurveFit, WaitsForEnoughKeyframes) { EXPECT_FALSE(curveOf(wiggle, 14)); }
+TEST(DepthCurveFit, WaitsForEnoughKeyframes) { EXPECT_FALSE(curveOf(wiggle, 9)); }
 
 TEST(DepthCurveFit, SaysNothingOfAStoredMapsCamera) {
   SimulatedKeyframes world(3);
@@ -101,7 +90,7 @@ TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
     }
   }
   ASSERT_GT(moved, 50);
-  for (const bool refine : {false, true}) EXPECT_FALSE(fitDepthCurve(map, DepthNoise(), refine));
+  EXPECT_FALSE(fitDepthCurve(map, DepthNoise()));
 }
 
 // End to end: the back end estimates the curve, reports it, and applies it to all keyframes.

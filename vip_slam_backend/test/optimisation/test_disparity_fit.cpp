@@ -74,7 +74,7 @@ TEST(DisparityFit, IsNotAskedOfOtherCamerasOrOfTooLittle) {
   DepthNoise tof = stereo();
   tof.type = DepthSensorType::kTof;
   EXPECT_FALSE(errorOf(tooLong, tof));
-  EXPECT_FALSE(errorOf(tooLong, stereo(), 14));
+  EXPECT_FALSE(errorOf(tooLong, stereo(), 9));
   SimulatedKeyframes world(3);
   world.setDepthCamera(tooLong, 0.004);
   Map map = mapAtTruePoses(&world, 60);

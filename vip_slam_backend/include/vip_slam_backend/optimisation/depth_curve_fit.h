@@ -15,10 +15,10 @@
 namespace vip_slam {
 
 /// Further correction of the readings, from the depth points on planes of this session's newest keyframes; empty unless
-/// it is significant and worth adjusting the map for; `refine`: there is a curve already, which smaller ones improve.
+/// it is significant.
 /// Poses are fixed, planes are free. Offset and scale are excluded from the curve: a map cannot separate them from its
 /// own scale, and the front end estimates the offset better.
-std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise, bool refine = false);
+std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise);
 
 /// Message to the user about an estimated curve when it is large enough to matter (2 mm); empty otherwise.
 std::string depthCurveDifference(const DepthCurve& found);

@@ -14,11 +14,10 @@
 namespace vip_slam {
 
 /// From all keyframes on the IMU chain but those of stored maps. `gravity`, m/s^2, has a prior sigma of 0.2 %, its
-/// variation between places. Unknown with less than ten seconds of IMU, or when the sigma is above one per cent and
-/// above a fifth of the difference: a scale that is wrong by much makes a large misfit of its own.
+/// variation between places. Unknown where its sigma is above a third.
 InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& noise);
 
-/// Whether the scale is off by so much that it is no matter of calibration, but of a wrong unit: significantly (five
+/// Whether the scale is off by so much that it is no matter of calibration, but of a wrong unit: significantly (three
 /// sigmas) and by more than five per cent.
 bool isLarge(const InertialScale& scale);
 
