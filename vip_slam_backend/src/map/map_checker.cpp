@@ -44,7 +44,7 @@ std::string checkImu(const MapKeyframe& previous, const MapKeyframe& kf) {
   if (const std::string bad = validateImu(*kf.imu); !bad.empty()) return bad;
   const Preintegration& factor = *kf.preintegration;
   if (!isFinite(factor)) return "its IMU factor is not finite";
-  if (std::abs(factor.dt() - (kf.imu->back().t - kf.imu->front().t)) > map_limits::kSameTime)
+  if (std::abs(factor.dt() - (kf.imu->back().t - kf.imu->front().t)) > map_limits::kRounding)
     return "its IMU factor lasts longer or shorter than the samples";
   if (!agreeInDuration(*kf.imu, previous.data->frame, kf.data->frame))
     return "its IMU samples last longer or shorter than its stamps say";
@@ -114,7 +114,7 @@ std::string checkPlane(PlaneId id, const PlaneEstimate& estimate) {
   const std::string name = "plane " + std::to_string(id) + ": ";
   if (id == 0 || estimate.id != id) return name + "carries no or another id";
   const Plane& plane = estimate.plane;
-  if (!plane.n.allFinite() || !std::isfinite(plane.d) || std::abs(plane.n.norm() - 1.0) > map_limits::kUnitNormal)
+  if (!plane.n.allFinite() || !std::isfinite(plane.d) || std::abs(plane.n.norm() - 1.0) > map_limits::kRounding)
     return name + "not a unit normal and a finite distance";
   if (!isAreaFinite(estimate)) return name + "its area or outline is not finite";
   return "";

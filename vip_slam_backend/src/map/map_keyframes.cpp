@@ -60,7 +60,7 @@ MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, co
         throw MapError(name + ": stamp is not after that of its previous keyframe " + std::to_string(data->previous));
       previous = data->previous;
       const auto& before = it->second.imu;
-      if (before && !data->imu.empty() && data->imu.front().t < before->back().t - map_limits::kSameTime)
+      if (before && !data->imu.empty() && data->imu.front().t < before->back().t - map_limits::kRounding)
         throw MapError(name + ": its IMU samples begin before those of its previous keyframe end");
       if (tellMotion(data->imu, it->second, *data)) imu = ImuSamples(data, &data->imu);
     }
@@ -258,7 +258,7 @@ void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) 
 void Map::widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise) {
   MapKeyframe& kf = keyframe(id);
   ImuNoiseScale scale = kf.imu_noise_scale;
-  scale.density = std::min(factor * scale.density, map_limits::kMaxNoiseScale);
+  scale.density = std::min(factor * scale.density, map_limits::kLargest);
   if (!isImuNoiseScale(scale))
     throw MapError("keyframe " + std::to_string(id) + ": factor on the IMU's noise is " + std::to_string(factor));
   if (kf.preintegration)

@@ -21,7 +21,7 @@ std::string validateParameters(const Plane& plane) {
 
 /// Its normal within the tolerance of files and checks, the same bits when it was already.
 Plane withUnitNormal(const Plane& plane) {
-  return std::abs(plane.n.norm() - 1.0) > map_limits::kUnitNormal ? Plane(plane.n, plane.d) : plane;
+  return std::abs(plane.n.norm() - 1.0) > map_limits::kRounding ? Plane(plane.n, plane.d) : plane;
 }
 
 }  // namespace

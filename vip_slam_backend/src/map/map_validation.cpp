@@ -21,14 +21,11 @@ bool isFinite(const Preintegration& factor) {
          factor.sqrtInformation().allFinite();
 }
 
-bool isGyroCorrection(const Eigen::Matrix3d& correction) {
-  return correction.allFinite() && correction.cwiseAbs().maxCoeff() <= map_limits::kMaxGyroCorrection;
-}
+bool isGyroCorrection(const Eigen::Matrix3d& correction) { return correction.allFinite() && correction.norm() < 1; }
 
 bool isImuNoiseScale(const ImuNoiseScale& scale) {
-  const auto usable = [](double factor, double most) { return factor > 0 && factor <= most; };
-  return usable(scale.density, map_limits::kMaxNoiseScale) && usable(scale.gyro_walk, map_limits::kMaxWalkScale) &&
-         usable(scale.accel_walk, map_limits::kMaxWalkScale);
+  const auto usable = [](double factor) { return factor > 0 && factor <= map_limits::kLargest; };
+  return usable(scale.density) && usable(scale.gyro_walk) && usable(scale.accel_walk);
 }
 
 std::string validateImu(const std::vector<ImuSample>& imu) {
@@ -38,14 +35,14 @@ std::string validateImu(const std::vector<ImuSample>& imu) {
       return formatted("IMU sample %zu is not finite", k);
     if (k > 0 && !(s.t > imu[k - 1].t))
       return formatted("IMU sample %zu at %.6f s is not after the one before, at %.6f s", k, s.t, imu[k - 1].t);
-    if (s.gyro.norm() > map_limits::kMaxRate)
-      return formatted("IMU sample %zu turns by %g rad/s, at most %g", k, s.gyro.norm(), map_limits::kMaxRate);
-    if (s.accel.norm() > map_limits::kMaxAcceleration)
-      return formatted("IMU sample %zu reads %g m/s^2, at most %g", k, s.accel.norm(), map_limits::kMaxAcceleration);
+    if (s.gyro.norm() > map_limits::kLargest)
+      return formatted("IMU sample %zu turns by %g rad/s, at most %g", k, s.gyro.norm(), map_limits::kLargest);
+    if (s.accel.norm() > map_limits::kLargest)
+      return formatted("IMU sample %zu reads %g m/s^2, at most %g", k, s.accel.norm(), map_limits::kLargest);
   }
   const double span = imu.empty() ? 0.0 : imu.back().t - imu.front().t;
-  if (span > map_limits::kLongestImu)
-    return formatted("IMU samples span %.0f s, at most %.0f", span, map_limits::kLongestImu);
+  if (span > map_limits::kLargest)
+    return formatted("IMU samples span %.0f s, at most %.0f", span, map_limits::kLargest);
   return "";
 }
 
@@ -56,7 +53,7 @@ bool agreeInDuration(const std::vector<ImuSample>& imu, const TrackedFrame& from
 
 bool continues(const std::vector<ImuSample>& imu, const std::vector<ImuSample>& before) {
   const double end = before.back().t;
-  return std::abs(imu.front().t - end) <= map_limits::kSameTime && imu.at(1).t > end;
+  return std::abs(imu.front().t - end) <= map_limits::kRounding && imu.at(1).t > end;
 }
 
 bool isAreaFinite(const PlaneEstimate& plane) {
@@ -95,14 +92,13 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   const std::string camera = validateCameraCorrection(keyframe.frame.camera_correction);
   if (!camera.empty()) return name + "the camera's correction: " + camera;
   if (!isGyroCorrection(keyframe.gyro_correction))
-    return name +
-           formatted("the gyro's correction is not finite, or has entries above %g", map_limits::kMaxGyroCorrection);
+    return name + "the gyro's correction is not finite, or could turn rates round";
   if (!isImuNoiseScale(keyframe.imu_noise_scale))
     return name + formatted(
                       "the scale of the IMU's noise is %g, of its random walks %g (gyroscope) and %g "
-                      "(accelerometer), expected more than 0, at most %g and %g",
+                      "(accelerometer), expected more than 0, at most %g",
                       keyframe.imu_noise_scale.density, keyframe.imu_noise_scale.gyro_walk,
-                      keyframe.imu_noise_scale.accel_walk, map_limits::kMaxNoiseScale, map_limits::kMaxWalkScale);
+                      keyframe.imu_noise_scale.accel_walk, map_limits::kLargest);
   if (!keyframe.depth_noise.isUsable())
     return name + formatted("the parts of the depth noise are %g (white) and %g (shared), expected variances",
                             keyframe.depth_noise.white, keyframe.depth_noise.shared);

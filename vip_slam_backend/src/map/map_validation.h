@@ -15,7 +15,7 @@ bool isFinite(const NavState& state);
 bool isFinite(const Preintegration& factor);
 /// Size and outline, not the parameters.
 bool isAreaFinite(const PlaneEstimate& plane);
-/// Finite, and within what a gyro can be off by.
+/// Finite, and so small that a corrected rate is invertible.
 bool isGyroCorrection(const Eigen::Matrix3d& correction);
 bool isImuNoiseScale(const ImuNoiseScale& scale);
 /// Empty when the samples are finite, in order and within the limits of map_limits.h, else the reason.

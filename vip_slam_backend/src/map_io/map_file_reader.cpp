@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 
 #include "map_file_format.h"
 #include "vip_slam_backend/map/map_limits.h"
@@ -13,6 +14,8 @@
 
 namespace vip_slam {
 namespace {
+
+using map_file::Version;
 
 double finite(ByteReader& in, const char* what) {
   const auto v = in.get<double>(what);
@@ -36,7 +39,8 @@ bool flag(ByteReader& in, const char* what) {
 SE3 readPose(ByteReader& in, const char* what) {
   const auto q = finiteVector<Eigen::Vector4d>(in, what);
   const auto t = finiteVector<Eigen::Vector3d>(in, what);
-  if (std::abs(q.norm() - 1.0) > 1e-6) in.fail(std::string(what) + ": rotation is not a unit quaternion");
+  if (std::abs(q.norm() - 1.0) > map_limits::kRounding)
+    in.fail(std::string(what) + ": rotation is not a unit quaternion");
   return SE3(Eigen::Quaterniond(q(3), q(0), q(1), q(2)), t);
 }
 
@@ -50,8 +54,8 @@ CameraIntrinsics readCamera(ByteReader& in) {
   const auto model = in.get<std::uint8_t>("camera model");
   if (model > 2) in.fail("camera model " + std::to_string(model) + ", expected 0 to 2");
   camera.model = static_cast<DistortionModel>(model);
-  camera.distortion.resize(in.count(8, "distortion coefficients"));
-  for (double& v : camera.distortion) v = finite(in, "distortion");
+  const std::size_t coefficients = in.count("distortion coefficients");
+  for (std::size_t k = 0; k < coefficients; ++k) camera.distortion.push_back(finite(in, "distortion"));
   const std::string problem = camera.validate();
   if (!problem.empty()) in.fail("camera: " + problem);
   return camera;
@@ -82,8 +86,9 @@ DepthGrid readGrid(ByteReader& in) {
 }
 
 Ring readRing(ByteReader& in) {
-  Ring ring(in.count(map_file::kPointBytes, "polygon points"));
-  for (Eigen::Vector3d& p : ring) p = finiteVector<Eigen::Vector3d>(in, "polygon point");
+  Ring ring;
+  const std::size_t points = in.count("polygon points");
+  for (std::size_t k = 0; k < points; ++k) ring.push_back(finiteVector<Eigen::Vector3d>(in, "polygon point"));
   return ring;
 }
 
@@ -96,15 +101,17 @@ void readPlane(ByteReader& in, Map& map) {
   e.kind = static_cast<PlaneKind>(kind);
   const bool optimised = flag(in, "plane flag");
   e.plane.n = finiteVector<Eigen::Vector3d>(in, "plane normal");
-  if (std::abs(e.plane.n.norm() - 1.0) > map_limits::kUnitNormal) in.fail("plane normal is not a unit vector");
+  if (std::abs(e.plane.n.norm() - 1.0) > map_limits::kRounding) in.fail("plane normal is not a unit vector");
   e.plane.d = finite(in, "plane distance");
   e.area = finite(in, "plane area");
   e.keyframes = in.get<std::uint32_t>("plane keyframes");
-  e.polygons.resize(in.count(8, "polygons"));
-  for (PlanePolygon& polygon : e.polygons) {
+  const std::size_t polygons = in.count("polygons");
+  for (std::size_t k = 0; k < polygons; ++k) {
+    PlanePolygon polygon;
     polygon.outer = readRing(in);
-    polygon.holes.resize(in.count(4, "holes"));
-    for (Ring& hole : polygon.holes) hole = readRing(in);
+    const std::size_t holes = in.count("holes");
+    for (std::size_t h = 0; h < holes; ++h) polygon.holes.push_back(readRing(in));
+    e.polygons.push_back(std::move(polygon));
   }
   map.setPlane(e);
   if (optimised) map.setPlaneParameters(e.id, e.plane);
@@ -117,31 +124,30 @@ PlaneObservation readObservation(ByteReader& in, KeyframeId keyframe) {
   for (int r = 0; r < 4; ++r)
     for (int c = r; c < 4; ++c) o.G(r, c) = o.G(c, r) = finite(in, "plane observation");
   o.weight_scale = finite(in, "plane observation");
-  o.points.resize(in.count(map_file::kPlaneSampleBytes, "plane points"));
-  for (PlaneSample& p : o.points) {
+  const std::size_t points = in.count("plane points");
+  for (std::size_t k = 0; k < points; ++k) {
+    PlaneSample p;
     p.p_C = in.vector<Eigen::Vector3f>("plane point");
     p.sigma = in.get<float>("plane point");
+    o.points.push_back(p);
   }
   return o;
 }
 
-Feature readFeature(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, LandmarkId first_landmark,
-                    std::uint32_t* landmark) {
+Feature readFeature(ByteReader& in, Version version, LandmarkId first_landmark, std::uint32_t* landmark) {
   Feature f;
   f.pixel = in.vector<Eigen::Vector2f>("feature");
   f.xy = in.vector<Eigen::Vector2f>("feature");
-  f.pixel_sigma = version < 2 ? map_file::kPixelSigmaOfVersion1 : in.get<float>("feature");
+  if (version >= Version::kPixelSigma) f.pixel_sigma = in.get<float>("feature");
   f.depth = in.get<float>("feature");
   f.depth_sigma = in.get<float>("feature");
   f.angle = in.get<float>("feature");
   if (!std::isfinite(f.angle)) in.fail("feature angle is not finite");
   f.octave = in.get<std::uint8_t>("feature");
-  const int track = version < 3 ? flag(in, "feature flag") : in.get<std::uint8_t>("feature track");
+  const int track = version < Version::kTracks ? flag(in, "feature flag") : in.get<std::uint8_t>("feature track");
   in.bytes(f.descriptor.data(), f.descriptor.size(), "feature");
   *landmark = in.get<std::uint32_t>("feature");
-  if (*landmark != map_file::kNoIndex && *landmark >= landmark_limit)
-    in.fail("landmark " + std::to_string(*landmark) + " cannot exist in a file of this size");
-  if (track > 0 && *landmark != map_file::kNoIndex) f.id = first_landmark + *landmark + track * kLoadedTracks;
+  if (track > 0 && *landmark != map_file::kNoIndex) f.id = first_landmark + *landmark + track * kLoadedLandmarks;
   return f;
 }
 
@@ -154,9 +160,12 @@ RelativeMotion readMotion(ByteReader& in) {
   return motion;
 }
 
-// Reads one keyframe into the map; its observations, by landmark, into `seen`.
-void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, LandmarkId first_landmark,
-                  const ImuNoise& noise, Map& map, std::vector<std::vector<MapObservation>>& seen) {
+// Observations with the index of their landmark, in the order of the file.
+using Sightings = std::vector<std::pair<std::uint32_t, MapObservation>>;
+
+// Reads one keyframe into the map; its observations into `seen`.
+void readKeyframe(ByteReader& in, Version version, LandmarkId first_landmark, const ImuNoise& noise, Map& map,
+                  Sightings& seen) {
   auto data = std::make_shared<Keyframe>();
   TrackedFrame& frame = data->frame;
   data->id = in.get<std::uint64_t>("keyframe id");
@@ -180,31 +189,31 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   const auto previous = in.get<std::uint64_t>("previous keyframe");
   frame.keyframe = data->id;
   data->previous = previous;
-  const std::size_t features = in.count(map_file::kFeatureBytes, "features");
-  frame.features.reserve(features);
+  const std::size_t features = in.count("features");
   for (std::uint32_t k = 0; k < features; ++k) {
     std::uint32_t landmark;
-    frame.features.push_back(readFeature(in, version, landmark_limit, first_landmark, &landmark));
-    if (landmark == map_file::kNoIndex) continue;
-    if (landmark >= seen.size()) seen.resize(landmark + 1);
-    seen[landmark].push_back({data->id, k});
+    frame.features.push_back(readFeature(in, version, first_landmark, &landmark));
+    if (landmark != map_file::kNoIndex) seen.push_back({landmark, {data->id, k}});
   }
   frame.depth_grid = readGrid(in);
-  if (version >= 4 && flag(in, "motion flag")) data->motion = readMotion(in);
+  if (version >= Version::kMotion && flag(in, "motion flag")) data->motion = readMotion(in);
   ImuNoiseScale& scale = data->imu_noise_scale;
-  if (version >= 6) scale.density = finite(in, "scale of the IMU's noise");
-  if (version >= 7) {
+  if (version >= Version::kNoiseScale) scale.density = finite(in, "scale of the IMU's noise");
+  if (version >= Version::kWalkScales) {
     scale.gyro_walk = finite(in, "scale of the gyroscope's random walk");
     scale.accel_walk = finite(in, "scale of the accelerometer's random walk");
   }
-  std::vector<ImuSample> imu(in.count(map_file::kImuBytes, "IMU samples"));
-  for (std::size_t k = 0; k < imu.size(); ++k) {
-    imu[k].t = finite(in, "IMU sample");
-    imu[k].gyro = finiteVector<Eigen::Vector3d>(in, "IMU sample");
-    imu[k].accel = finiteVector<Eigen::Vector3d>(in, "IMU sample");
+  std::vector<ImuSample> imu;
+  const std::size_t samples = in.count("IMU samples");
+  for (std::size_t k = 0; k < samples; ++k) {
+    ImuSample sample;
+    sample.t = finite(in, "IMU sample");
+    sample.gyro = finiteVector<Eigen::Vector3d>(in, "IMU sample");
+    sample.accel = finiteVector<Eigen::Vector3d>(in, "IMU sample");
+    imu.push_back(sample);
   }
   map.restoreKeyframe(data, state, previous, imu, noise).loop_keyframe = loop_keyframe;
-  const std::size_t planes = in.count(8 + 11 * 8 + 4, "plane observations");
+  const std::size_t planes = in.count("plane observations");
   for (std::size_t k = 0; k < planes; ++k) {
     const PlaneObservation observation = readObservation(in, data->id);
     if (!map.setPlaneObservation(observation))
@@ -224,24 +233,26 @@ void readLandmark(ByteReader& in, LandmarkId id, std::vector<MapObservation>&& s
   map.restoreLandmark(landmark);
 }
 
-void readPayload(ByteReader& in, std::uint32_t version, LandmarkId first_landmark, const ImuNoise& noise,
-                 StoredMap* stored) {
+void readPayload(ByteReader& in, Version version, LandmarkId first_landmark, const ImuNoise& noise, StoredMap* stored) {
   Map& map = stored->map;
   stored->vocabulary_id = in.get<std::uint64_t>("vocabulary id");
-  if (version >= 5 && flag(in, "camera flag")) stored->camera = readCamera(in);
-  const std::size_t planes = in.count(map_file::kPlaneBytes, "planes");
+  if (version >= Version::kCamera && flag(in, "camera flag")) stored->camera = readCamera(in);
+  const std::size_t planes = in.count("planes");
   for (std::size_t k = 0; k < planes; ++k) readPlane(in, map);
-  const std::size_t keyframes = in.count(map_file::kKeyframeBytes, "keyframes");
-  const std::size_t landmark_limit = in.left() / map_file::kLandmarkBytes;
-  std::vector<std::vector<MapObservation>> seen;
-  for (std::size_t k = 0; k < keyframes; ++k)
-    readKeyframe(in, version, landmark_limit, first_landmark, noise, map, seen);
-  const std::size_t landmarks = in.count(map_file::kLandmarkBytes, "landmarks");
-  if (seen.size() > landmarks)
+  const std::size_t keyframes = in.count("keyframes");
+  Sightings seen;
+  for (std::size_t k = 0; k < keyframes; ++k) readKeyframe(in, version, first_landmark, noise, map, seen);
+  const std::size_t landmarks = in.count("landmarks");
+  std::stable_sort(seen.begin(), seen.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  if (!seen.empty() && seen.back().first >= landmarks)
     in.fail("keyframes see more landmarks than the " + std::to_string(landmarks) + " stored");
-  seen.resize(landmarks);
-  for (std::uint32_t k = 0; k < landmarks; ++k) readLandmark(in, first_landmark + k, std::move(seen[k]), map);
-  const std::size_t loops = in.count(16, "loops");
+  auto next = seen.begin();
+  for (std::uint32_t k = 0; k < landmarks; ++k) {
+    std::vector<MapObservation> views;
+    for (; next != seen.end() && next->first == k; ++next) views.push_back(next->second);
+    readLandmark(in, first_landmark + k, std::move(views), map);
+  }
+  const std::size_t loops = in.count("loops");
   for (std::size_t k = 0; k < loops; ++k) {
     const auto query = in.get<std::uint64_t>("loop"), match = in.get<std::uint64_t>("loop");
     if (!map.hasKeyframe(query) || !map.hasKeyframe(match)) in.fail("a loop joins keyframes that are not there");
@@ -256,27 +267,28 @@ void readPayload(ByteReader& in, std::uint32_t version, LandmarkId first_landmar
 StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise,
                    LandmarkId first_landmark) {
   ByteReader in(data, size, source);
-  char magic[8];
-  if (size < map_file::kHeader + 4) in.fail("too short for a map file (" + std::to_string(size) + " bytes)");
-  in.bytes(magic, 8, "magic");
-  if (std::memcmp(magic, map_file::kMagic, 8) != 0) in.fail("not a map file, expected it to start with VIPMAP");
-  const auto version = in.get<std::uint32_t>("version");
-  if (version < map_file::kOldestVersion || version > map_file::kVersion)
-    in.fail("map file version " + std::to_string(version) + ", expected " + std::to_string(map_file::kOldestVersion) +
-            " to " + std::to_string(map_file::kVersion));
-  if (in.get<std::uint32_t>("reserved") != 0) in.fail("reserved field is not 0");
-  const auto length = in.get<std::uint64_t>("length");
-  if (length != in.left() - 4)
-    in.fail("payload of " + std::to_string(in.left() - 4) + " bytes, expected " + std::to_string(length) +
+  const map_file::Header expected;
+  map_file::Header header;
+  if (size < sizeof header + 4) in.fail("too short for a map file (" + std::to_string(size) + " bytes)");
+  in.bytes(&header, sizeof header, "header");
+  if (std::memcmp(header.magic, expected.magic, sizeof header.magic) != 0)
+    in.fail("not a map file, expected it to start with VIPMAP");
+  const auto number = [](Version version) { return std::to_string(static_cast<std::uint32_t>(version)); };
+  if (header.version < Version::kFirst || header.version > expected.version)
+    in.fail("map file version " + number(header.version) + ", expected " + number(Version::kFirst) + " to " +
+            number(expected.version));
+  if (header.reserved != 0) in.fail("reserved field is not 0");
+  if (header.payload_bytes != in.left() - 4)
+    in.fail("payload of " + std::to_string(in.left() - 4) + " bytes, expected " + std::to_string(header.payload_bytes) +
             " (truncated?)");
   std::uint32_t crc;
   std::memcpy(&crc, data + size - 4, 4);
   if (crc32(data, size - 4) != crc) in.fail("checksum is wrong, the file is damaged");
 
-  ByteReader payload(data + map_file::kHeader, static_cast<std::size_t>(length), source);
+  ByteReader payload(data + sizeof header, static_cast<std::size_t>(header.payload_bytes), source);
   StoredMap stored;
   try {
-    readPayload(payload, version, first_landmark, noise, &stored);
+    readPayload(payload, header.version, first_landmark, noise, &stored);
   } catch (const MapError& e) {
     payload.fail(e.what());
   }

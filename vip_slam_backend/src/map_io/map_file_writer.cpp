@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
 
 #include "map_file_format.h"
@@ -105,8 +106,9 @@ struct LandmarkNumbers {
     std::vector<LandmarkId>& known = tracks[index.at(landmark)];
     const auto at = std::find(known.begin(), known.end(), f.id);
     const std::size_t number = static_cast<std::size_t>(at - known.begin()) + 1;
-    if (at == known.end() && number <= map_file::kMaxTracks) known.push_back(f.id);
-    return static_cast<std::uint8_t>(std::min(number, map_file::kMaxTracks));
+    constexpr auto last = std::numeric_limits<std::uint8_t>::max();
+    if (at == known.end() && number <= last) known.push_back(f.id);
+    return static_cast<std::uint8_t>(std::min<std::size_t>(number, last));
   }
 };
 
@@ -166,12 +168,8 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch, Landmark
 std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
                          std::uint64_t vocabulary_id, const std::optional<CameraIntrinsics>& camera) {
   ByteWriter out;
-  out.bytes(map_file::kMagic, 8);
-  out.put(map_file::kVersion);
-  out.put(std::uint32_t(0));
-  const std::size_t length_at = out.data().size();
-  out.put(std::uint64_t(0));
-
+  map_file::Header header;
+  out.bytes(&header, sizeof header);
   out.put(vocabulary_id);
   out.put(static_cast<std::uint8_t>(camera.has_value()));
   if (camera) write(out, *camera);
@@ -207,8 +205,8 @@ std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId,
   }
 
   std::string bytes = out.take();
-  const std::uint64_t length = bytes.size() - map_file::kHeader;
-  std::memcpy(&bytes[length_at], &length, sizeof length);
+  header.payload_bytes = bytes.size() - sizeof header;
+  std::memcpy(&bytes[0], &header, sizeof header);
   const std::uint32_t crc = crc32(bytes.data(), bytes.size());
   bytes.append(reinterpret_cast<const char*>(&crc), sizeof crc);
   return bytes;

@@ -314,14 +314,14 @@ TEST(Map, LandmarksOfManyViewsAreKeptHoweverOftenTheyAreHidden) {
   LandmarkId proven = kNoLandmark, doubtful = kNoLandmark, of_three = kNoLandmark;
   for (const LandmarkId id : f.map.landmarkIds()) {
     const MapLandmark& l = f.map.landmark(id);
-    if (l.observations.back().keyframe >= 29) continue;
+    if (l.observations.back().keyframe >= 16) continue;
     if (l.observations.size() > 3) proven = id;
     if (l.observations.size() == 3) (doubtful == kNoLandmark ? doubtful : of_three) = id;
   }
   ASSERT_NE(proven, kNoLandmark);
   ASSERT_NE(of_three, kNoLandmark);
   f.map.landmark(proven).visible = f.map.landmark(doubtful).visible = 40;
-  cullLandmarks(29, &f.map);
+  cullLandmarks(16, &f.map);
   EXPECT_TRUE(f.map.hasLandmark(proven));
   EXPECT_TRUE(f.map.hasLandmark(of_three));
   EXPECT_FALSE(f.map.hasLandmark(doubtful));

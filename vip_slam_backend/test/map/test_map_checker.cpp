@@ -104,7 +104,7 @@ TEST(MapChecker, SeesDamagedKeyframes) {
       {"state in the map", inKeyframe(2, [](MapKeyframe* kf) { kf->state.bias_gyro.x() = kNan; })},
       {"state in the map", inKeyframe(2, [](MapKeyframe* kf) { kf->state.bias_accel.x() = kNan; })},
       {"extrinsics in the map", inKeyframe(2, [](MapKeyframe* kf) { kf->T_I_C.t().x() = kNan; })},
-      {"gyro's correction in the map", inKeyframe(2, [](MapKeyframe* kf) { kf->gyro_correction(1, 2) = 0.6; })},
+      {"gyro's correction in the map", inKeyframe(2, [](MapKeyframe* kf) { kf->gyro_correction(1, 2) = 1.1; })},
       {"IMU's noise in the map", inKeyframe(2, [](MapKeyframe* kf) { kf->imu_noise_scale.density = 0; })},
   });
 }

@@ -225,7 +225,7 @@ TEST(MapRefusals, OfStatesAndCorrections) {
   const NavState good = map.keyframe(2).state;
   Eigen::Matrix3d nan = Eigen::Matrix3d::Zero(), large = nan;
   nan(1, 2) = kNan;
-  large(1, 2) = 0.6;
+  large(1, 2) = 1.1;
   f.expectRefusals({
       {"keyframe 2: new state", stating([](NavState* s) { s->t = kNan; })},
       {"keyframe 2: new state", stating([](NavState* s) { s->T_W_I = kNanPose; })},
@@ -258,9 +258,8 @@ TEST(MapRefusals, OfStatesAndCorrections) {
       {"new correction of the gyro", [&] { map.adoptGyroCorrection(large, noise); }},
       {"no keyframe 99", [&] { map.covisible(99); }},
   });
-  // A correction that takes a direction away cannot be undone.
+  // A correction that takes a direction away could not be undone.
   Eigen::Matrix3d flat = Eigen::Matrix3d::Zero();
   flat.topLeftCorner<2, 2>().setConstant(-0.5);
-  map.adoptGyroCorrection(flat, noise);
-  f.expectRefusals({{"corrected state is not finite", [&] { map.adoptGyroCorrection(-flat, noise); }}});
+  f.expectRefusals({{"new correction of the gyro", [&] { map.adoptGyroCorrection(flat, noise); }}});
 }

@@ -58,10 +58,11 @@ class ByteReader {
     std::memcpy(p, at_, n);
     at_ += n;
   }
-  /// A count of elements of at least `element_bytes` each: refused when the rest of the data cannot hold them.
-  std::size_t count(std::size_t element_bytes, const char* what) {
+  /// A count of elements, refused when the rest of the data cannot hold a byte of each. They are to be stored one by
+  /// one as they are read, so that a wrong count takes no memory.
+  std::size_t count(const char* what) {
     const auto n = get<std::uint32_t>(what);
-    if (n > left() / element_bytes)
+    if (n > left())
       fail(std::to_string(n) + " " + what + " do not fit into the " + std::to_string(left()) + " bytes left");
     return n;
   }
