@@ -220,7 +220,7 @@ FrameOutput FrontEnd::Impl::trackImage(ImageStep step, const FrontEnd::PoseReady
   if (std::optional<FrameOutput> ended = trackPoints(&step)) return *ended;
   isolateFaults(&step);
   updateFilter(&step);
-  const std::string failure = health_.divergence(step.report, filter_.nav().v_W.norm(), step.sight);
+  const std::string failure = health_.divergence(step.report, step.sight);
   if (!failure.empty()) return startAnew(step, failure);
   if (!health_.resume(step.sight)) return startAnew(step, "features are back after LOST");
   depth_input_.remember(step.depth, step.gray, filter_.nav().T_W_I * extrinsics(), step.t);

@@ -17,7 +17,6 @@ struct RecoveryOptions {
   double max_imu_gap = 0.1;
   double max_image_gap = 10.0;
   double max_position_sigma = 2.0;
-  double max_speed = 20.0;
 
   /// Longest IMU gap over which the IMU is believed, s; in a longer one images and depth carry the pose.
   double longestImuGap() const { return 5.0 * max_imu_gap; }
@@ -32,7 +31,6 @@ struct RecoveryOptions {
             "images missing for longer than this restart the tracking, s; until then the IMU carries the pose");
     v.field("max_position_sigma", max_position_sigma, 0.05, 100.0,
             "LOST when the position's sigma has grown by this without features, m; beyond, recovery is a new epoch");
-    v.field("max_speed", max_speed, 0.5, 300.0, "an estimated speed above this is a failure, m/s");
   }
 };
 

@@ -37,15 +37,13 @@ bool Health::contradictedForLong(const Sight& sight) const {
   return lost() && (sight.t - last_held_t_ > patience || coastedSigma(sight.variance) > options_.max_position_sigma);
 }
 
-std::string Health::divergence(const StepReport& report, double speed, const Sight& sight) {
+std::string Health::divergence(const StepReport& report, const Sight& sight) {
   const int needed = options_.min_tracks;
   const bool agrees =
       sight.moves_by_itself ? sight.old_with_depth >= needed : sight.pose_ok && sight.tracked >= 2 * needed;
   if (sight.still || agrees) last_agreed_t_ = sight.t;
 
   if (!report.healthy) return "the filter became singular";
-  const double most = options_.max_speed;
-  if (speed > most) return formatted("estimated speed is %.1f m/s, at most %g (recovery/max_speed)", speed, most);
   if (contradictedForLong(sight)) return "what is seen contradicts the IMU";
   return "";
 }

@@ -55,7 +55,7 @@ class Health {
   void noteFault(double t_imu) { fault_t_ = t_imu; }
 
   /// Reason why the estimate can no longer be trusted after an update; empty when it can.
-  std::string divergence(const StepReport& report, double speed, const Sight& sight);
+  std::string divergence(const StepReport& report, const Sight& sight);
   /// Judges the tracking state and ends LOST when features are back. False when the position is too uncertain by then.
   bool resume(const Sight& sight);
   /// An image that cannot be used, and why. LOST once nothing has carried the pose for too long: `imu_ended`, or the

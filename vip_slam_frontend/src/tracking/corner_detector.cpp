@@ -6,6 +6,8 @@
 
 #include <opencv2/features2d.hpp>
 
+#include "vip_slam_frontend/tracking/pixel_noise.h"
+
 namespace vip_slam {
 
 namespace {
@@ -108,7 +110,7 @@ std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Poi
         if (!mask.empty()) cv::KeyPointsFilter::runByPixelsMask(keypoints, mask(roi));
       };
       search(options.fast_threshold);
-      if (keypoints.empty() && taken == 0) search(options.fast_threshold_low);
+      if (keypoints.empty() && taken == 0) search(cvRound(kGreySigma));
       std::vector<Corner> cell;
       for (const cv::KeyPoint& k : keypoints) {
         const cv::Point2f p(k.pt.x + roi.x, k.pt.y + roi.y);

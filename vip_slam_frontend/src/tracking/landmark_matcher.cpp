@@ -8,6 +8,8 @@
 
 #include <opencv2/features2d.hpp>
 
+#include "vip_slam_frontend/tracking/pixel_noise.h"
+
 namespace vip_slam {
 
 namespace {
@@ -159,7 +161,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     }
     const int x = static_cast<int>(visible[i].uv.x()), y = static_cast<int>(visible[i].uv.y());
     const cv::Rect roi(x - kSearchRadius - 3, y - kSearchRadius - 3, 2 * kSearchRadius + 7, 2 * kSearchRadius + 7);
-    cv::FAST(gray(roi & cv::Rect(0, 0, gray.cols, gray.rows)), keypoints, options_.fast_threshold_low, true);
+    cv::FAST(gray(roi & cv::Rect(0, 0, gray.cols, gray.rows)), keypoints, cvRound(kGreySigma), true);
     for (const cv::KeyPoint& k : keypoints) {
       Feature f;
       f.pixel = Eigen::Vector2f(k.pt.x + std::max(0, roi.x), k.pt.y + std::max(0, roi.y));

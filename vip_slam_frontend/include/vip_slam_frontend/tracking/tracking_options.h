@@ -10,7 +10,6 @@ struct TrackingOptions {
   int max_features = 200;
   double min_distance = 16.0;
   int fast_threshold = 16;
-  int fast_threshold_low = 5;
   int border = 12;
   int keyframe_corners = 400;
 
@@ -18,8 +17,8 @@ struct TrackingOptions {
     v.field("max_features", max_features, 20, 2000, "features tracked per image");
     v.field("min_distance", min_distance, 3.0, 200.0,
             "smallest distance between tracked features, px of an image of 640 x 480");
-    v.field("fast_threshold", fast_threshold, 2, 100, "FAST threshold tried first, grey levels");
-    v.field("fast_threshold_low", fast_threshold_low, 1, 100, "FAST threshold in cells where the first found nothing");
+    v.field("fast_threshold", fast_threshold, 2, 100,
+            "FAST threshold, grey levels; where it finds nothing, what noise of grey values allows");
     v.field("border", border, 4, 100, "no features nearer to the image border, px of an image of 640 x 480");
     v.field("keyframe_corners", keyframe_corners, 0, 5000, "untracked ORB corners added to a keyframe");
   }
