@@ -11,10 +11,10 @@
 namespace vip_slam {
 namespace {
 
-// Of focal lengths, and of principal points as a share of the width, as between calibrations of cameras of one kind.
-constexpr double kMaxDifference = 0.05;
+constexpr double kMaxFocal = 0.01;   // relative difference of focal lengths, as between calibrations of one camera
+constexpr double kMaxCentre = 0.05;  // difference of principal points as a share of the width
 
-bool differ(double a, double b) { return std::abs(a - b) > kMaxDifference * std::max(a, b); }
+bool differ(double a, double b) { return std::abs(a - b) > kMaxFocal * std::max(a, b); }
 
 bool isFisheye(const CameraIntrinsics& camera) { return camera.model == DistortionModel::kEquidistant; }
 
@@ -31,13 +31,13 @@ void requireCamera(const StoredMap& stored, const CameraIntrinsics& camera, cons
   // The depth grids of stored keyframes are interpreted with the present camera's intrinsics.
   const double centre = std::hypot(made.cx - camera.cx, made.cy - camera.cy);
   if (made.width == camera.width && made.height == camera.height && !differ(made.fx, camera.fx) &&
-      !differ(made.fy, camera.fy) && centre <= kMaxDifference * camera.width && isFisheye(made) == isFisheye(camera))
+      !differ(made.fy, camera.fy) && centre <= kMaxCentre * camera.width && isFisheye(made) == isFisheye(camera))
     return;
   throw std::runtime_error(path + ": made with images of " + describe(made) + ", but the camera now has " +
                            describe(camera) +
                            formatted("; expected the same size and lens, focal lengths within %g %% and the centre "
                                      "within %g %% of the width",
-                                     100 * kMaxDifference, 100 * kMaxDifference));
+                                     100 * kMaxFocal, 100 * kMaxCentre));
 }
 
 }  // namespace vip_slam

@@ -3,7 +3,7 @@
 //
 // The odometry sees a window of less than half a second. What all its measurements share over that time (lens, readout,
 // depth that is off over a surface) does not show in its residuals and is not in its covariance. The map holds the same
-// places over seconds. So motions over a second are compared, outside of any adjustment: for a
+// places over seconds. So motions over half a second to two seconds are compared, outside of any adjustment: for a
 // motion with the covariance C of the odometry, which the map has otherwise by r = (theta, t), q = r^T C^-1 r / 6 has
 // the mean one where C is true and the map knows the motion far better; the mean of q is the factor that C lacks. The
 // map's own error counts as the odometry's.

@@ -66,8 +66,8 @@ TEST(OdometryNoise, WhatTheCovarianceLacksIsFound) {
   DrawnOdometry odometry;
   EXPECT_EQ(odometry.noise.varianceFactor(), kStart);
   EXPECT_NEAR(odometry.settled(3), 9, 1);
-  DrawnOdometry better;
-  EXPECT_NEAR(better.settled(1.5), 2.25, 0.3);  // and goes down as well
+  EXPECT_NEAR(odometry.settled(1.5), 2.25, 0.3);  // and goes down as well
+  EXPECT_NEAR(odometry.settled(5), 25, 3);
 }
 
 TEST(OdometryNoise, NoCovarianceIsTakenForTooLarge) {
@@ -76,15 +76,17 @@ TEST(OdometryNoise, NoCovarianceIsTakenForTooLarge) {
   EXPECT_EQ(odometry.noise.varianceFactor(), 1.0);
 }
 
-TEST(OdometryNoise, MotionsThatAreNotKnownAreNoEvidence) {
-  DrawnOdometry unknown;
+TEST(OdometryNoise, MotionsThatAreNotKnownOrTakeTooLongAreNoEvidence) {
+  DrawnOdometry unknown, slow;
   for (int k = 0; k < 50; ++k) unknown.step(5, 0.2, false);
+  for (int k = 0; k < 50; ++k) slow.step(5, 2.5);
   EXPECT_EQ(unknown.noise.varianceFactor(), kStart);
+  EXPECT_EQ(slow.noise.varianceFactor(), kStart);
 }
 
 TEST(OdometryNoise, TheNewestSecondIsNotJudgedYetAndNothingTwice) {
   DrawnOdometry odometry;
-  for (int k = 0; k < 8; ++k) odometry.step(5);  // 1.4 s: none has a second before and one behind it
+  for (int k = 0; k < 8; ++k) odometry.step(5);  // 1.4 s: none has half a second before and a second behind it
   EXPECT_EQ(odometry.noise.varianceFactor(), kStart);
   for (int k = 0; k < 10; ++k) odometry.step(5);
   const double after = odometry.noise.varianceFactor();
