@@ -16,8 +16,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kEstablished = 3;  // a plane seen by this many keyframes is removed only after two contradictions
-
 bool isSound(const CameraCorrection& correction) { return validateCameraCorrection(correction).empty(); }
 
 bool isSound(const DepthGrid& grid) {
@@ -56,7 +54,7 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
       mesher_.build(frame.features, frame.depth_grid, T_map_C.R().row(2), frame.camera_correction.bearing);
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options_.growth);
-  releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
+  releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, options_.detection.max_rms, &label);
   const CameraPoses& poses = keyframes_.poses();
   const KeyframeId host = poses.count(frame.keyframe) ? frame.keyframe : keyframes_.newest();
   std::vector<double> area(tracks.size(), 0);
@@ -85,7 +83,8 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   if (first_time) removeContradicted(triangles, T_map_C, keyframe.frame.epoch);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, keyframe.frame.epoch);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options_.growth);
-  const std::vector<PlaneId> beside = releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
+  const std::vector<PlaneId> beside =
+      releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, options_.detection.max_rms, &label);
 
   std::vector<CellIndex> seen_again;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
@@ -124,7 +123,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
 }
 
 // Called before the triangles are associated: they then join the remaining planes or start new ones. A plane that
-// several keyframes have seen is not removed because of a single one.
+// more keyframes have seen than it needs is removed only when two in a row contradict it.
 void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C,
                                            std::uint32_t epoch) {
   const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, epoch);
@@ -135,7 +134,8 @@ void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& trian
     if (verdict == PlaneVerdict::kFor) track->contradictions = 0;
     if (verdict != PlaneVerdict::kAgainst) continue;
     ++track->contradictions;
-    if (track->keyframes_seen < kEstablished || track->contradictions > 1) contradicted.push_back(track->id());
+    if (track->keyframes_seen <= options_.support.min_keyframes || track->contradictions > 1)
+      contradicted.push_back(track->id());
   }
   for (PlaneId id : contradicted) {
     planes_.remove(id);

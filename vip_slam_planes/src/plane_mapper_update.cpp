@@ -14,9 +14,6 @@
 namespace vip_slam {
 namespace {
 
-// Largest number of keyframes per update that are processed again after the map has moved their observations off
-// planes.
-constexpr std::size_t kMaxRenewed = 10;
 constexpr double kMovedTurn = 0.5 * kDegree, kMovedShift = 0.02;  // of a keyframe by one update, rad and m
 
 }  // namespace
@@ -224,7 +221,8 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
     for (KeyframeId keyframe : broken) planes_.withdraw(&track, keyframe);
     renewed.insert(broken.begin(), broken.end());
   }
-  while (renewed.size() > kMaxRenewed) renewed.erase(renewed.begin());  // keep the newest
+  const auto newest = static_cast<std::size_t>(options_.detection.keyframes);  // those a plane may start from
+  while (renewed.size() > newest) renewed.erase(renewed.begin());
   for (KeyframeId id : renewed) processKeyframe(*keyframes_.placed().at(id), false);
 }
 

@@ -18,17 +18,10 @@ namespace {
 
 constexpr double kPatchReach = 0.4;  // metres from the patch's first triangle
 constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegree;
-constexpr double kMinPatch = 0.01;  // m^2
 constexpr std::size_t kMinTriangles = 4;
 // Least area, relative to that for a plane in one image. Small upright surfaces are mostly furniture. Dark or polished
 // table tops have depth in pieces only: such planes start small and narrow, and are grown by tracked frames.
 constexpr double kMinUpright = 2.0, kMinLevel = 0.3;
-constexpr double kMinLevelWidth = 0.6;  // likewise of the width
-// A plane this far below a known one may be what that lies on, m.
-constexpr double kStepDown = 0.02;
-// Left-over triangles join a plane that has grown up to them within this distance, m, or within their noise:
-// further off they may be another layer that no keyframe has told apart yet.
-constexpr double kSameLayer = 0.02;
 constexpr int kMaxTests = 4;  // peaks tested per keyframe, the largest ones
 // Share of the area of a wall's peak that must be new since its last test. Horizontal peaks are tested every time,
 // since the visible pieces of a dark table top change.
@@ -48,12 +41,14 @@ bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::ve
          }) >= 2;
 }
 
-// Whether the plane lies on a known floor or table, hardly higher than the distance at which it would join that.
-bool liesOn(const DetectedPlane& plane, const std::vector<const PlaneTrack*>& known, const PlaneGrowthOptions& growth) {
+// Whether the plane lies on a known floor or table, or is one itself: no further below it than `step`, and hardly
+// higher than the distance at which it would join it.
+bool liesOn(const DetectedPlane& plane, const std::vector<const PlaneTrack*>& known, double step,
+            const PlaneGrowthOptions& growth) {
   return std::any_of(known.begin(), known.end(), [&](const PlaneTrack* track) {
     if (track->kind() != plane.kind || track->plane().n.dot(plane.plane.n) < 0) return false;
     const double height = track->plane().signedDistance(plane.centroid);
-    if (height < -kStepDown || height > 2 * growth.distance) return false;
+    if (height < -step || height > 2 * growth.distance) return false;
     const int reach = static_cast<int>(std::ceil(growth.gap / track->cellSize()));
     return track->cells().near(track->cellAt(track->toPlane(plane.centroid)), reach);
   });
@@ -95,7 +90,7 @@ void PlaneEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<Map
     }
     const Eigen::Vector3d n = normals.normalized();
     const double z = std::abs(n.z());
-    if (members.size() < kMinTriangles || area < kMinPatch || (z < level && z > upright)) continue;
+    if (members.size() < kMinTriangles || area < growth_.cell * growth_.cell || (z < level && z > upright)) continue;
     Patch patch;
     patch.kind = z >= level ? PlaneKind::kHorizontal : PlaneKind::kVertical;
     patch.n_C = T_C_map.rotation() * n;
@@ -172,8 +167,9 @@ std::vector<std::pair<const PlaneTrack*, EvidenceTriangle>> PlaneEvidence::takeJ
     std::vector<char> joins = belongsTo(known, evidence, label);
     for (std::size_t i = 0; i < evidence.size(); ++i) {
       const MapTriangle& t = evidence[i].triangle;
+      // Further off they may be another layer that no keyframe has shown apart yet.
       joins[i] = joins[i] && std::abs(known[label[i]]->plane().signedDistance(t.centre)) <
-                                 std::max(kSameLayer, kNoiseSigmas * t.sigma);
+                                 std::max(detection_.max_rms, kNoiseSigmas * t.sigma);
       if (joins[i]) joining.emplace_back(known[label[i]], evidence[i]);
     }
     forget(votes, evidence, joins);
@@ -241,7 +237,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     const PlaneKind kind = frames_[votes.front().frame].patches[votes.front().patch].kind;
     PlaneDetectionOptions together = detection_;
     together.min_area *= kind == PlaneKind::kHorizontal ? kMinLevel : kMinUpright;
-    if (kind == PlaneKind::kHorizontal) together.min_width *= kMinLevelWidth;
+    if (kind == PlaneKind::kHorizontal) together.min_width *= std::sqrt(kMinLevel);
     if (peak.area < together.min_area) continue;
     double fresh = 0;
     for (const Vote& v : votes) {
@@ -260,7 +256,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
       PlaneTrack area(0, kind, plane.plane, plane.centroid, 0.5 * growth_.cell);
       for (int i : plane.triangles) area.cover(triangles[i], 1, SE3(), nullptr);
       const bool small = area.area() < kMinUpright * detection_.min_area;
-      if (area.area() < together.min_area || (small && liesOn(plane, known, growth_)) ||
+      if (area.area() < together.min_area || (small && liesOn(plane, known, detection_.max_rms, growth_)) ||
           !shownBySeveral(evidence, triangles, plane, detection_.min_keyframes)) {
         continue;
       }

@@ -5,13 +5,14 @@
 #include <cmath>
 #include <numeric>
 
+#include "vip_slam_core/util/significance.h"
+
 namespace vip_slam {
 namespace {
 
 constexpr double kFinest = 0.0025;  // m, bins of the distances along the normal
 constexpr double kValley = 0.4;     // largest height of a valley, relative to the lower of the two modes
 constexpr double kMinShare = 0.2;   // of the whole weight; a smaller part counts as outliers
-constexpr int kMinVotes = 10;       // fewer have valleys by chance
 constexpr int kMaxBins = 1000;      // members of a peak lie within a few tens of centimetres
 
 struct Bin {
@@ -25,7 +26,9 @@ struct Bin {
 void cutAtValleys(const std::vector<Bin>& bins, int first, int last, std::vector<int>* cuts) {
   const double least = kMinShare * bins.back().below;
   const auto suffices = [&](int from, int to) {
-    return bins[to].below - bins[from].below >= least && bins[to].votes_below - bins[from].votes_below >= kMinVotes;
+    const int votes = bins[to].votes_below - bins[from].votes_below;
+    // Counts scatter by their root: few votes have valleys by chance.
+    return bins[to].below - bins[from].below >= least && votes > kNoiseSigmas * std::sqrt(double(votes));
   };
   std::vector<double> right(last - first + 1, 0);
   for (int i = last - 1; i >= first; --i) right[i - first] = std::max(right[i - first + 1], bins[i].hump);

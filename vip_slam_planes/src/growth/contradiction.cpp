@@ -15,7 +15,6 @@ namespace {
 
 constexpr std::size_t kMinTriangles = 10;  // fewer do not determine a direction
 constexpr double kFacing = 0.7;            // cosine to the plane's normal; sides of objects on it are turned further
-constexpr double kMinShare = 0.5;          // share of the plane's area; a smaller part of a wall may bend
 constexpr double kOnPlane = 0.01;          // m, plus three sigmas: largest distance of a corner that lies on a plane
 
 /// The nearest plane on whose covered area a corner lies; null: none.
@@ -61,7 +60,8 @@ PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const Plane
     sigmas.push_back(t.sigma);
     area += t.area;
   }
-  if (points.size() < kMinTriangles || area < kMinShare * track.area()) return PlaneVerdict::kNone;
+  // A smaller part of a wall may bend.
+  if (points.size() < kMinTriangles || 2 * area < track.area()) return PlaneVerdict::kNone;
   const double sigma = upperMedian(std::move(sigmas));
   Plane shown;
   double rms = 0;

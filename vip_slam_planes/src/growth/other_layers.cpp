@@ -12,12 +12,12 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kMinInLayers = 30;  // fewer do not show two layers
-constexpr double kMinStep = 0.02;         // m, between the layers
 
 }  // namespace
 
 std::vector<PlaneId> releaseOtherLayers(const std::vector<MapTriangle>& triangles,
-                                        const std::vector<const PlaneTrack*>& tracks, std::vector<int>* label) {
+                                        const std::vector<const PlaneTrack*>& tracks, double min_step,
+                                        std::vector<int>* label) {
   std::vector<PlaneId> beside(label->size(), 0);
   std::vector<std::vector<int>> members(tracks.size());
   for (std::size_t i = 0; i < label->size(); ++i) {
@@ -32,7 +32,7 @@ std::vector<PlaneId> releaseOtherLayers(const std::vector<MapTriangle>& triangle
       area.push_back(triangles[i].area);
       sigma.push_back(triangles[i].sigma);
     }
-    const double noise = upperMedian(sigma), step = std::max(kMinStep, kNoiseSigmas * noise);
+    const double noise = upperMedian(sigma), step = std::max(min_step, kNoiseSigmas * noise);
     const auto [low, high] = std::minmax_element(offset.begin(), offset.end());
     if (*high - *low < step) continue;
     const auto layers = splitLayers(offset, area, noise);

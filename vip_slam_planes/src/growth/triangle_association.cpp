@@ -12,7 +12,6 @@ namespace {
 constexpr double kWidestAngle = 25.0 * kDegree;
 constexpr int kNone = -1;
 constexpr double kToldApart = 2.0;  // sigmas of a triangle's distance by which the nearest plane must be nearer
-constexpr double kMinSigma = 1e-3;  // m
 
 /// A triangle whose noise does not allow a decision between two planes.
 struct Doubt {
@@ -71,11 +70,10 @@ void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<
         next_best = distance, second = static_cast<int>(k);
       }
     }
-    if (second == kNone || next_best - best > kToldApart * t.sigma) continue;
+    if (second == kNone || next_best - best >= kToldApart * t.sigma) continue;
     const bool ascending = (*label)[i] < second;
-    const double sigma = std::max(t.sigma, kMinSigma);
-    doubts[i].track[!ascending] = (*label)[i], doubts[i].squares[!ascending] = best * best / (sigma * sigma);
-    doubts[i].track[ascending] = second, doubts[i].squares[ascending] = next_best * next_best / (sigma * sigma);
+    doubts[i].track[!ascending] = (*label)[i], doubts[i].squares[!ascending] = std::pow(best / t.sigma, 2);
+    doubts[i].track[ascending] = second, doubts[i].squares[ascending] = std::pow(next_best / t.sigma, 2);
   }
   settleDoubts(triangles, doubts, label);
 }

@@ -17,7 +17,6 @@ namespace {
 constexpr std::size_t kWays = 8, kPlaces = 12;  // lines from the smaller piece to the larger, and points on each
 constexpr double kRim = 0.15;                   // m, uncertainty of a piece's border, not tested
 constexpr double kOpen = 0.05;                  // share of points that may be open, since poses and depth have errors
-constexpr double kUnsure = 0.5;                 // share of points that may be undecided
 constexpr double kFlattest = 0.1;               // cosine of 84 degrees, the mesh's limit for horizontal surfaces
 
 std::vector<Eigen::Vector3d> borderOf(const PlaneTrack& track) {
@@ -120,8 +119,8 @@ bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneV
       }
     }
   }
-  const auto unsure = std::count(seen.begin(), seen.end(), Gap::kUnsure);
-  return static_cast<double>(unsure) > kUnsure * static_cast<double>(places.size());
+  const auto unsure = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), Gap::kUnsure));
+  return 2 * unsure > places.size();
 }
 
 }  // namespace vip_slam

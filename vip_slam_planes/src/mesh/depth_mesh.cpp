@@ -172,8 +172,8 @@ bool DepthMeshBuilder::brokenBetween(const MeshVertex& a, const MeshVertex& b, c
     return c < 0 || r < 0 || c >= grid.cols || r >= grid.rows ? 0.0f : grid.at(c, r);
   };
   const float za = a.p_C.z(), zb = b.p_C.z(), z = 0.5f * (za + zb);
-  constexpr float kSpread = 2.45f;  // sqrt(1 + 4 + 1): a second difference
-  const float tolerance = float(options_.gap_sigmas * noise_.sigma(z)) * kMedianGain * kSpread + 0.005f;
+  const float sigma = float(noise_.sigma(z)) * kMedianGain, of_difference = std::hypot(sigma, 2 * sigma, sigma);
+  const float tolerance = float(options_.gap_sigmas) * of_difference + 0.005f;
   const auto straight = [&](float first, float middle, float last) {
     return first > 0 && middle > 0 && std::abs(1.0f / first - 2.0f / middle + 1.0f / last) * z * z < tolerance;
   };

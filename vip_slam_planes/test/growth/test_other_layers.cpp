@@ -27,7 +27,7 @@ std::vector<MapTriangle> wallWithBoard(double at, double board, int every, doubl
 std::vector<int> released(const std::vector<MapTriangle>& triangles) {
   const PlaneTrack wall(1, PlaneKind::kVertical, Plane({0, -1, 0}, 2.0), {0, 2, 0}, 0.1);
   std::vector<int> label(triangles.size(), 0), gone;
-  const std::vector<PlaneId> beside = releaseOtherLayers(triangles, {&wall}, &label);
+  const std::vector<PlaneId> beside = releaseOtherLayers(triangles, {&wall}, 0.02, &label);
   for (std::size_t i = 0; i < label.size(); ++i) {
     EXPECT_EQ(label[i] < 0 ? wall.id() : 0u, beside[i]) << i;
     if (label[i] < 0) gone.push_back(static_cast<int>(i));
