@@ -6,17 +6,11 @@
 
 #include "plane_mapper_impl.h"
 #include "state/fit_to_observations.h"
-#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"
 #include "vip_slam_core/types/camera_correction.h"
 #include "vip_slam_planes/growth/moved_surface.h"
 
 namespace vip_slam {
-namespace {
-
-constexpr double kMovedTurn = 0.5 * kDegree, kMovedShift = 0.02;  // of a keyframe by one update, rad and m
-
-}  // namespace
 
 PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   const ScopedTimer timer(timing_, "planes.update", update.t);
@@ -92,7 +86,7 @@ void PlaneMapper::Impl::removeUnnamed(const MapUpdate& update) {
 }
 
 void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
-  bool map_moved = update.global;  // by a noticeable amount
+  bool map_moved = update.global;  // so far that what a keyframe shows may be farther from its plane than it may be
   // Before any pose changes: the cells of removed keyframes are handed over at their present place, and then move with
   // their new host.
   for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
@@ -103,7 +97,8 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     if (pose == keyframes_.poses().end() || !isSound(estimate)) continue;
     const SE3 T_map_C = pose->second, corrected = estimate.state.T_W_I * estimate.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
-    map_moved = map_moved || move.t().norm() > kMovedShift || logSO3(move.rotation()).norm() > kMovedTurn;
+    const double swing = move.t().norm() + noise_.max_range * logSO3(move.rotation()).norm();
+    map_moved = map_moved || swing > options_.growth.distance;
     const auto it = keyframes_.placed().find(estimate.id);
     const bool other_depth =
         it != keyframes_.placed().end() && adoptCameraCorrection(estimate.camera_correction, it->second);

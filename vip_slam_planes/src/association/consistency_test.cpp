@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -18,8 +19,8 @@ bool estimate(const std::vector<PointSighting>& sightings, const Eigen::Matrix<d
               double least_pixel_sigma, Eigen::Vector3d* p, Eigen::Matrix<double, N, N>* information) {
   using MatrixN = Eigen::Matrix<double, N, N>;
   using VectorN = Eigen::Matrix<double, N, 1>;
-  constexpr int kRounds = 5;
-  for (int round = 0; round < kRounds; ++round) {
+  // Until the steps are small, or no longer converge.
+  for (double last = std::numeric_limits<double>::infinity();;) {
     MatrixN H = MatrixN::Zero();
     VectorN g = VectorN::Zero();
     const auto addRow = [&](const Eigen::RowVector3d& J, double r) {
@@ -41,7 +42,9 @@ bool estimate(const std::vector<PointSighting>& sightings, const Eigen::Matrix<d
     const VectorN step = -(H + 1e-9 * H.trace() * MatrixN::Identity()).ldlt().solve(g);
     if (!step.allFinite()) return false;
     *p += B * step;
-    if (step.norm() < 1e-5) break;
+    const double length = step.norm();
+    if (length < 1e-5 || !(2 * length < last)) break;
+    last = length;
   }
   return p->allFinite();
 }

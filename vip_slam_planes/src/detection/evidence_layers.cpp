@@ -8,10 +8,6 @@
 namespace vip_slam {
 namespace {
 
-// A triangle belongs to the layer beside a plane when it is nearer to that than this share of its distance to the
-// plane.
-constexpr double kNearerLayer = 0.5;
-
 // Median offset from a plane of the evidence that keyframes have told to be another layer beside it; 0: none.
 double layerBeside(const PlaneTrack& plane, const std::vector<EvidenceTriangle>& evidence) {
   std::vector<double> offset;
@@ -38,7 +34,7 @@ std::vector<char> belongsTo(const std::vector<const PlaneTrack*>& known, const s
   for (std::size_t i = 0; i < evidence.size(); ++i) {
     if (label[i] < 0 || known[label[i]]->id() == evidence[i].beside) continue;
     const double offset = known[label[i]]->plane().signedDistance(evidence[i].triangle.centre);
-    belongs[i] = layer[label[i]] == 0 || std::abs(offset - layer[label[i]]) > kNearerLayer * std::abs(offset);
+    belongs[i] = layer[label[i]] == 0 || std::abs(offset - layer[label[i]]) > std::abs(offset);
   }
   return belongs;
 }

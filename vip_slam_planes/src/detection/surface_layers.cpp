@@ -13,7 +13,6 @@ namespace {
 constexpr double kFinest = 0.0025;  // m, bins of the distances along the normal
 constexpr double kValley = 0.4;     // largest height of a valley, relative to the lower of the two modes
 constexpr double kMinShare = 0.2;   // of the whole weight; a smaller part counts as outliers
-constexpr int kMaxBins = 1000;      // members of a peak lie within a few tens of centimetres
 
 struct Bin {
   double weight = 0, hump = 0;  ///< of its votes; smoothed
@@ -55,7 +54,8 @@ std::vector<std::vector<int>> splitLayers(const std::vector<double>& offset, con
   std::iota(layers[0].begin(), layers[0].end(), 0);
   if (offset.empty()) return layers;
   const auto [low, high] = std::minmax_element(offset.begin(), offset.end());
-  const double bin = std::max({kFinest, 0.5 * sigma, (*high - *low) / kMaxBins});
+  const double per_vote = (*high - *low) / double(offset.size());  // more bins than votes would be empty
+  const double bin = std::max({kFinest, 0.5 * sigma, per_vote});
   const int count = static_cast<int>((*high - *low) / bin) + 1;
   const auto binOf = [&, low = *low](double d) { return std::min(count - 1, static_cast<int>((d - low) / bin)); };
   std::vector<Bin> bins(count + 1);

@@ -2,6 +2,7 @@
 #include "vip_slam_planes/merging/plane_merging.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -15,7 +16,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kNoise = 11.3;         // 99 % quantile of the chi-square with three degrees of freedom
 constexpr double kNoisyDistance = 2.0;  // factor on the distance when noise explains it
 
 PlaneMoments surfaceMoments(const PlaneTrack& track, const CameraPoses& poses) {
@@ -26,33 +26,33 @@ PlaneMoments surfaceMoments(const PlaneTrack& track, const CameraPoses& poses) {
   return moments;
 }
 
-/// What a joint fit adds to the RMS of the worse of both, m; infinity when there is no fit.
-double jointMisfit(const PlaneMoments& a, const PlaneMoments& b, const PlaneTrack& track) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
-  const PlaneMoments both{a.M + b.M};
-  Plane joint, own;
-  if (!fitPlane(both, track.kind(), track.plane().n, &joint)) return kNone;
-  double worst = 0;
-  for (const PlaneMoments* m : {&a, &b}) {
-    if (!fitPlane(*m, track.kind(), track.plane().n, &own)) return kNone;
-    worst = std::max(worst, m->meanSquare(joint) - m->meanSquare(own));
-  }
-  return std::sqrt(worst);
+/// What a joint fit adds to the mean square of each, m^2; infinity when there is no fit.
+std::array<double, 2> jointExcess(const PlaneMoments& a, const PlaneMoments& b, const PlaneTrack& track) {
+  std::array<double, 2> excess;
+  excess.fill(std::numeric_limits<double>::infinity());
+  Plane joint, own_a, own_b;
+  const auto fits = [&track](const PlaneMoments& m, Plane* plane) {
+    return fitPlane(m, track.kind(), track.plane().n, plane);
+  };
+  if (!fits({a.M + b.M}, &joint) || !fits(a, &own_a) || !fits(b, &own_b)) return excess;
+  excess = {a.meanSquare(joint) - a.meanSquare(own_a), b.meanSquare(joint) - b.meanSquare(own_b)};
+  return excess;
 }
 
-/// Whether the noise of their depth points allows that both are one plane (chi-square test). From afar the noise is
-/// centimetres and degrees, too much for a fixed limit. False for planes of a loaded map, whose noise is not known.
+/// What a joint fit adds to the RMS of the worse of both, m; infinity when there is no fit.
+double jointMisfit(const PlaneMoments& a, const PlaneMoments& b, const PlaneTrack& track) {
+  const auto [of_a, of_b] = jointExcess(a, b, track);
+  return std::sqrt(std::max({0.0, of_a, of_b}));
+}
+
+/// Whether the noise of their depth points allows that both are one plane (significance of what a joint fit adds). From
+/// afar the noise is centimetres and degrees, too much for a fixed limit. False for planes of a loaded map, whose noise
+/// is not known.
 bool noiseAllowsOne(const PlaneTrack& a, const PlaneTrack& b, const PlaneViews& views) {
   const PlaneMoments of_a = a.information(views), of_b = b.information(views);
   if (!(of_a.weight() > 0) || !(of_b.weight() > 0)) return false;
-  Plane joint, own;
-  if (!fitPlane({of_a.M + of_b.M}, a.kind(), a.plane().n, &joint)) return false;
-  double excess = 0;
-  for (const PlaneMoments* m : {&of_a, &of_b}) {
-    if (!fitPlane(*m, a.kind(), a.plane().n, &own)) return false;
-    excess += m->weight() * (m->meanSquare(joint) - m->meanSquare(own));
-  }
-  return excess < kNoise;
+  const auto [excess_a, excess_b] = jointExcess(of_a, of_b, a);
+  return of_a.weight() * excess_a + of_b.weight() * excess_b < kNoiseSigmas * kNoiseSigmas;
 }
 
 // Drift moves a keyframe as a whole, so surfaces that keyframes show at two depths are separate, even if views from
