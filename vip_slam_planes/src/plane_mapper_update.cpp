@@ -176,7 +176,8 @@ void PlaneMapper::Impl::judgeAgreement() {
 
 // Removes the observations of a moved surface from before the move. True when it was moved.
 bool PlaneMapper::Impl::forgetWhereItWas(PlaneTrack* track) {
-  const KeyframeId since = surfaceMovedAt(*track, keyframes_.poses());
+  const KeyframeId since =
+      surfaceMovedAt(*track, keyframes_.poses(), options_.support.min_views, options_.merging.max_rms);
   if (since == 0) return false;
   const auto& observations = track->observations();
   while (!observations.empty() && observations.begin()->first < since) {

@@ -5,56 +5,54 @@
 #include <cmath>
 #include <vector>
 
+#include "vip_slam_core/util/significance.h"
+
 namespace vip_slam {
 namespace {
-
-constexpr std::size_t kMinBefore = 3, kMinSince = 4;  // observations
-constexpr double kMoved = 0.02;                       // m
-constexpr double kScatter = 0.25;                     // largest scatter of each group, relative to the shift
-constexpr double kSamePlace = 0.4;                    // distance of centroids, relative to the root of the area
 
 struct Seen {
   KeyframeId keyframe;
   double offset;          // m, along the normal
   Eigen::Vector2d place;  // in the plane's frame
+  double spread;          // m, of its samples
 };
 
 struct Group {
-  double mean = 0, deviation = 0;
+  double mean = 0, variance = 0;
 };
 
 Group groupOf(std::vector<Seen>::const_iterator begin, std::vector<Seen>::const_iterator end) {
   Group group;
   const double n = double(end - begin);
   for (auto it = begin; it != end; ++it) group.mean += it->offset / n;
-  for (auto it = begin; it != end; ++it) group.deviation += std::pow(it->offset - group.mean, 2) / n;
-  group.deviation = std::sqrt(group.deviation);
+  for (auto it = begin; it != end; ++it) group.variance += std::pow(it->offset - group.mean, 2) / (n - 1);
   return group;
 }
 
 }  // namespace
 
-KeyframeId surfaceMovedAt(const PlaneTrack& track, const CameraPoses& poses) {
+KeyframeId surfaceMovedAt(const PlaneTrack& track, const CameraPoses& poses, int min_views, double min_shift) {
   std::vector<Seen> seen;
   for (const auto& [keyframe, observation] : track.observations()) {
     const auto pose = poses.find(keyframe);
     if (pose == poses.end() || !(observation.G(3, 3) > 0)) continue;
-    const Eigen::Vector3d centre = pose->second * PlaneMoments{observation.G}.centroid();
-    seen.push_back({keyframe, track.plane().signedDistance(centre), track.toPlane(centre)});
+    const PlaneMoments moments{observation.G};
+    const Eigen::Vector3d centre = pose->second * moments.centroid();
+    seen.push_back({keyframe, track.plane().signedDistance(centre), track.toPlane(centre), moments.spread()});
   }
-  if (seen.size() < kMinBefore + kMinSince) return 0;
+  if (seen.size() < 2 * std::size_t(min_views)) return 0;
   KeyframeId moved_at = 0;
-  double least = 1;  // scatter over shift
-  for (auto since = seen.begin() + kMinBefore; since + kMinSince <= seen.end(); ++since) {
+  double least = 1 / kNoiseSigmas;  // scatter over shift
+  for (auto since = seen.begin() + min_views; since + min_views <= seen.end(); ++since) {
     const Group before = groupOf(seen.begin(), since), after = groupOf(since, seen.end());
-    const double way = std::abs(after.mean - before.mean), most = std::max(before.deviation, after.deviation);
-    if (way < kMoved || most > kScatter * way || most > least * way) continue;
-    const double reach = kSamePlace * std::sqrt(track.area());
+    const double shift = std::abs(after.mean - before.mean), scatter = std::sqrt(before.variance + after.variance);
+    if (shift < min_shift || !(scatter < least * shift)) continue;
     const auto shown_before = [&](const Seen& s) {
-      return std::any_of(seen.begin(), since, [&](const Seen& b) { return (b.place - s.place).norm() < reach; });
+      return std::any_of(seen.begin(), since,
+                         [&](const Seen& b) { return (b.place - s.place).norm() < b.spread + s.spread; });
     };
     if (2 * std::count_if(since, seen.end(), shown_before) < seen.end() - since) continue;
-    least = most / way;
+    least = scatter / shift;
     moved_at = since->keyframe;
   }
   return moved_at;
