@@ -13,9 +13,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kMinTriangles = 10;  // fewer do not determine a direction
-constexpr double kFacing = 0.7;            // cosine to the plane's normal; sides of objects on it are turned further
-constexpr double kOnPlane = 0.01;          // m, plus three sigmas: largest distance of a corner that lies on a plane
+constexpr double kFacing = 0.7;    // cosine to the plane's normal; sides of objects on it are turned further
+constexpr double kOnPlane = 0.01;  // m, plus three sigmas: largest distance of a corner that lies on a plane
 
 /// The nearest plane on whose covered area a corner lies; null: none.
 const PlaneTrack* ownerOf(const Eigen::Vector3d& corner, double sigma, const std::vector<const PlaneTrack*>& tracks) {
@@ -61,7 +60,7 @@ PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const Plane
     area += t.area;
   }
   // A smaller part of a wall may bend.
-  if (points.size() < kMinTriangles || 2 * area < track.area()) return PlaneVerdict::kNone;
+  if (points.empty() || 2 * area < track.area()) return PlaneVerdict::kNone;
   const double sigma = upperMedian(std::move(sigmas));
   Plane shown;
   double rms = 0;

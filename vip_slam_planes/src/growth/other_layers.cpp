@@ -9,11 +9,6 @@
 #include "vip_slam_planes/detection/surface_layers.h"
 
 namespace vip_slam {
-namespace {
-
-constexpr std::size_t kMinInLayers = 30;  // fewer do not show two layers
-
-}  // namespace
 
 std::vector<PlaneId> releaseOtherLayers(const std::vector<MapTriangle>& triangles,
                                         const std::vector<const PlaneTrack*>& tracks, double min_step,
@@ -25,7 +20,7 @@ std::vector<PlaneId> releaseOtherLayers(const std::vector<MapTriangle>& triangle
   }
   std::vector<double> offset, area, sigma;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (members[k].size() < kMinInLayers) continue;
+    if (members[k].empty()) continue;
     offset.clear(), area.clear(), sigma.clear();
     for (int i : members[k]) {
       offset.push_back(tracks[k]->plane().signedDistance(triangles[i].centre));
