@@ -22,7 +22,6 @@ constexpr std::size_t kMinTriangles = 4;
 // Least area, relative to that for a plane in one image. Small upright surfaces are mostly furniture. Dark or polished
 // table tops have depth in pieces only: such planes start small and narrow, and are grown by tracked frames.
 constexpr double kMinUpright = 2.0, kMinLevel = 0.3;
-constexpr int kMaxTests = 4;  // peaks tested per keyframe, the largest ones
 // Share of the area of a wall's peak that must be new since its last test. Horizontal peaks are tested every time,
 // since the visible pieces of a dark table top change.
 constexpr double kFreshShare = 0.25;
@@ -223,7 +222,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
       all.push_back({f, k});
     }
   }
-  for (int tests = 0; tests < kMaxTests;) {
+  while (true) {
     const PlaneHistogram::Peak peak = histogram.peak();
     if (peak.area < kMinLevel * detection_.min_area) break;
     std::vector<Vote> votes;
@@ -246,7 +245,6 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     }
     if (kind == PlaneKind::kVertical && fresh < kFreshShare * peak.area) continue;
     for (const Vote& v : votes) frames_[v.frame].patches[v.patch].tested = true;
-    ++tests;
     const std::vector<EvidenceTriangle> evidence = collect(votes, poses);
     const std::vector<MapTriangle> triangles = trianglesOf(evidence);
     const std::vector<int> label = associateTriangles(triangles, known, growth_);

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kWidestAngle = 25.0 * kDegree;
 constexpr int kNone = -1;
-constexpr double kToldApart = 2.0;  // sigmas of a triangle's distance by which the nearest plane must be nearer
 
 /// A triangle whose noise does not allow a decision between two planes.
 struct Doubt {
@@ -70,7 +69,7 @@ void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<
         next_best = distance, second = static_cast<int>(k);
       }
     }
-    if (second == kNone || next_best - best >= kToldApart * t.sigma) continue;
+    if (second == kNone || next_best - best >= kNoiseSigmas * t.sigma) continue;
     const bool ascending = (*label)[i] < second;
     doubts[i].track[!ascending] = (*label)[i], doubts[i].squares[!ascending] = std::pow(best / t.sigma, 2);
     doubts[i].track[ascending] = second, doubts[i].squares[ascending] = std::pow(next_best / t.sigma, 2);
