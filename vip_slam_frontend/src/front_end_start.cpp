@@ -38,7 +38,7 @@ FrameOutput FrontEnd::Impl::initialise(const ImageStep& step) {
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.feature.depth > 0; });
   const bool surfaces = !depth.empty() && surfaces_.sees(depth);
   std::optional<Eigen::Vector3d> up;
-  if (!depth.empty() && !inertial_.hasAccel()) up = frontend::upByFloor(shareNormals(surfaces_.patches(depth)));
+  if (!depth.empty()) up = frontend::upByFloor(shareNormals(surfaces_.patches(depth)));
   std::optional<FilterPrior> prior =
       initialiser_.add({t_imu, static_cast<int>(points), surfaces, up, first ? std::nullopt : moved}, inertial_);
   if (!prior) {
@@ -53,7 +53,9 @@ FrameOutput FrontEnd::Impl::initialise(const ImageStep& step) {
   counters_.level = initialiser_.level();
   initialiser_.reset();
   health_.start(t, filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff());
-  sources_.start(t_imu);
+  const std::string& fault = initialiser_.accelerometerFault();
+  sources_.start(t_imu, !fault.empty());
+  health_.setImuFault(fault);
   // The tracks' references were taken under unknown poses: begin them here.
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
   tracker_.restartReferences(T_odom_C, colourRows(filter_.nav()));

@@ -141,8 +141,7 @@ std::optional<FrameOutput> FrontEnd::Impl::trackPoints(ImageStep* step) {
 }
 
 void FrontEnd::Impl::isolateFaults(ImageStep* step) {
-  const bool fault =
-      !step->no_imu && sources_.imuIsAtFault(step->tracked, step->by_imu, step->propagation, imuIsContradicted());
+  const bool fault = !step->no_imu && sources_.imuIsAtFault(step->tracked, step->by_imu, step->propagation);
   counters_.imu_faults += fault;
   if (!step->no_imu && !fault) return;
   if (!step->by_images) step->moved = sources_.goingOn();

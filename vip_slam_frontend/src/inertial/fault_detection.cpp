@@ -4,41 +4,32 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::frontend {
 
 namespace {
 
-// The share of the last second from which on it is at fault. While a body may fill the view it is half of it.
-constexpr double kSustained = 0.2;
+// Of a single interval: twice the innovation gate. Ordinary images reach the gate in rendered sequences, and nearly
+// twice of it on a real phone, whose images have errors that no covariance knows.
+constexpr double kBeyond = 2 * kGateSigmas;
+// Of a sound IMU's trials so many pass. (0.985, four sigmas, isolates one in the dark of a rendered sequence.)
+constexpr double kTrialProbability = 0.999;
 // A turn by so much shows whether the vertical is right, rad: wrong axes make 3 m/s^2 of it.
 constexpr double kShowsVertical = 0.3;
 
 }  // namespace
 
-double motionDifference(const SE3& a, const SE3& b, const Matrix6d& covariance) {
-  const Vector6d d = a.boxminus(b);
-  const double squared = d.dot(covariance.ldlt().solve(d));
-  return std::isfinite(squared) ? std::sqrt(std::max(0.0, squared)) : 0.0;
-}
-
-bool FaultDetection::isOnProbation(double t) const { return t - last_fault_t_ < isolation() + kFaultMemory; }
-
-void FaultDetection::reset(double t) {
+void FaultDetection::reset(double t, bool at_fault) {
   *this = FaultDetection();
+  isolated_ = at_fault;
+  if (at_fault) first_fault_t_ = last_fault_t_ = t;
   doubt_t_ = t;
 }
 
 bool FaultDetection::add(const MotionEvidence& e) {
-  // Ordinary images reach the innovation gate in rendered sequences, and nearly twice of it on a real phone, whose
-  // images have errors that no covariance knows.
-  const bool deviates = e.images_agree && e.sigmas > 2 * kGateSigmas;
-  const bool contradicts = e.images_agree && (e.implausible || deviates || (suspects(e.t) && e.sigmas > kGateSigmas));
-  const double gain = std::min(1.0, e.interval / kFaultMemory);
-  if (e.images_agree) contradicted_ += gain * (contradicts - contradicted_);
+  const bool deviates = e.images_agree && e.sigmas > kBeyond;
+  const bool contradicts = e.images_agree && e.sigmas > (suspects(e.t) ? kGateSigmas : kBeyond);
   if (!e.images_agree) disagreed_t_ = e.t;
   if (!e.images_agree || deviates) {
     if (e.t - doubt_t_ > kMoment) began_t_ = e.t;
@@ -47,15 +38,25 @@ bool FaultDetection::add(const MotionEvidence& e) {
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;
   const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || isOnProbation(e.t));
-  const double share = e.t - disagreed_t_ > kFaultMemory ? kSustained : 0.5;
-  const bool fault = begins || goes_on || (contradicts && contradicted_ > share);
-  // An IMU whose faults come back is believed again later each time.
+  static const double trial_gate = std::sqrt(chiSquareQuantile(kTrialProbability, 6));
+  const bool tried = e.trial && e.trial->duration >= kMoment;
+  const bool agrees = tried && e.trial->sigmas < kGateSigmas;
+  const bool fault = begins || goes_on || (tried && e.trial->sigmas > trial_gate && e.t - disagreed_t_ > kFaultMemory);
+  if (fault || !agrees) agreed_ = 0;
   if (fault) {
-    const double since = e.t - last_fault_t_;
-    if (since > isolation()) isolated_ = isOnProbation(e.t) ? 2 * isolation() : 0.0;
+    if (!isOnProbation(e.t)) first_fault_t_ = e.t;
+    isolated_ = true;
     last_fault_t_ = e.t;
+    to_agree_ = std::max(kMoment, last_fault_t_ - first_fault_t_);
+  } else if (isolated_ && agrees) {
+    // A trial is of half a second, the next one of an interval more.
+    agreed_ += agreed_ > 0 ? e.interval : kMoment;
+    if (agreed_ >= to_agree_) {
+      isolated_ = false;
+      recovered_t_ = e.t;
+    }
   }
-  const bool isolated = fault || (e.images_agree && e.t - last_fault_t_ < isolated_);
+  const bool isolated = fault || (e.images_agree && isolated_);
   if (e.images_agree && !vertical_confirmed_) {
     if (fault || e.disputed)
       agreement_ = std::max(agreement_ - e.turn, -kShowsVertical);

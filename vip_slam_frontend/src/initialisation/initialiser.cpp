@@ -96,21 +96,26 @@ std::optional<FilterPrior> Initialiser::add(const InitialisationInput& image, co
   FilterPrior prior;
   prior.state.t = t;
   // Level: up is where the specific force points, in the body as it is oriented now.
-  level_ = inertial.hasAccel() ? frontend::Level::kAccelerometer
-           : image.up          ? frontend::Level::kFloor
-                               : frontend::Level::kCamera;
   Eigen::Vector3d up = T_I_C_.R() * image.up.value_or(-Eigen::Vector3d::UnitY());
   prior.sigma_tilt = prior.sigma_position;  // without an accelerometer part of the gauge
+  accelerometer_fault_.clear();
+  ImuSpread spread;
+  double slow = 0;
   if (inertial.hasAccel()) {
-    const ImuSpread spread = imuSpread(samples, &noise_);
+    spread = imuSpread(samples, &noise_);
     // A slow acceleration does not show as a scatter, and may be as large as the scatter of a standing body.
-    const double slow = filter_.zupt.max_accel_std;
+    slow = filter_.zupt.max_accel_std;
     if (spread.quiet(filter_.zupt.max_gyro_std, filter_.zupt.max_accel_std) &&
         std::abs(spread.mean_accel.norm() - gravity_) > kGateSigmas * std::hypot(filter_.sigma_bias_accel, slow)) {
-      reason_ = formatted("the accelerometer reads %.2f at rest, expected %.2f m/s^2: is its unit right?",
-                          spread.mean_accel.norm(), gravity_);
-      return std::nullopt;
+      accelerometer_fault_ = formatted("the accelerometer reads %.2f at rest, expected %.2f m/s^2: is its unit right?",
+                                       spread.mean_accel.norm(), gravity_);
     }
+  }
+  const bool by_accelerometer = inertial.hasAccel() && accelerometer_fault_.empty();
+  level_ = by_accelerometer ? frontend::Level::kAccelerometer
+           : image.up       ? frontend::Level::kFloor
+                            : frontend::Level::kCamera;
+  if (by_accelerometer) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d R_now_then = Eigen::Matrix3d::Identity();
     for (std::size_t k = samples.size(); k-- > 0;) {

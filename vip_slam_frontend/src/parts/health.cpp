@@ -68,7 +68,10 @@ std::string Health::doubts(const Sight& sight) const {
            "right? check_bag tells";
   }
   if (sight.t_imu - silent_imu_t_ < kMoment) return "no IMU samples: held by images and depth";
-  if (sight.t_imu - fault_t_ < kMoment) return "the IMU contradicts what is seen: held by images and depth";
+  if (sight.t_imu - fault_t_ < kMoment) {
+    if (!imu_fault_.empty()) return imu_fault_ + " Held by images and depth";
+    return "the IMU contradicts what is seen: held by images and depth";
+  }
   if (sight.vertical_unknown) {
     return "the IMU contradicts what is seen from its first motion on, and the vertical is not known: are its axes, "
            "signs and units, and T_imu_cam right? check_bag tells";

@@ -53,6 +53,8 @@ class Health {
   void noteSilence(double t_imu) { silent_imu_t_ = t_imu; }
   /// The IMU was at fault before the image at t_imu.
   void noteFault(double t_imu) { fault_t_ = t_imu; }
+  /// What is known of the IMU's fault from the start on; empty: nothing.
+  void setImuFault(const std::string& what) { imu_fault_ = what; }
 
   /// Reason why the estimate can no longer be trusted after an update; empty when it can.
   std::string divergence(const StepReport& report, const Sight& sight);
@@ -89,6 +91,7 @@ class Health {
   double silent_imu_t_ = -1e300;     ///< no IMU samples before it
   double fault_t_ = -1e300;          ///< the IMU at fault before it
   double gyro_range_ = 0;            ///< that limit, rad/s
+  std::string imu_fault_;
 };
 
 }  // namespace vip_slam::frontend

@@ -9,6 +9,7 @@
 #include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
+#include "vip_slam_frontend/inertial/motion_difference.h"
 
 namespace vip_slam::frontend {
 
@@ -19,13 +20,6 @@ constexpr double kSharedByTracks = 9.0;
 // What one alignment errs, the next one does too: in each direction, one sigma in rad and m. Judged on real recordings
 // of a Kinect and an Xtion.
 constexpr double kAlignedLeast = 2e-3;
-
-/// Adds the errors that no covariance of this motion has: `least` (rad and m) and a share of it.
-void admitMotionError(const SE3& motion, double least, Matrix6d* covariance) {
-  const auto variance = [least](double size) { return std::pow(least, 2) + std::pow(kMotionErrorShare * size, 2); };
-  covariance->diagonal().head<3>().array() += variance(logSO3(motion.R()).norm());
-  covariance->diagonal().tail<3>().array() += variance(motion.t().norm());
-}
 
 }  // namespace
 
@@ -139,9 +133,8 @@ bool MotionSources::admitCutOff(double from, double t_imu, Propagation* propagat
 }
 
 bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction,
-                                 const Propagation& propagation, bool implausible) {
+                                 const Propagation& propagation) {
   MotionEvidence evidence;
-  evidence.implausible = implausible;
   evidence.disputed = filter_->isDisputed();
   evidence.t = propagation.predicted.t;
   evidence.interval = prediction.interval;
@@ -150,14 +143,14 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
                           areMismatches(tracking.lost_outlier, tracking.tracked + tracking.lost_outlier);
   if (evidence.images_agree) {
     const Matrix15d P = filter_->covariance();
-    const Eigen::Matrix3d R_C_I = filter_->extrinsics().R().transpose();
-    const Eigen::Matrix3d R_C_W = R_C_I * propagation.predicted.T_W_I.R().transpose();
-    Matrix6d covariance = tracking.motion.covariance;
-    covariance.topLeftCorner<3, 3>() += R_C_I * propagation.turnCovariance(P) * R_C_I.transpose();
-    covariance.bottomRightCorner<3, 3>() += R_C_W * propagation.displacementCovariance(P) * R_C_W.transpose();
+    Matrix6d covariance = tracking.motion.covariance + motionCovariance(propagation, P, filter_->extrinsics());
     admitMotionError(prediction.T_current_previous, kMotionError, &covariance);
     evidence.turn = logSO3(tracking.motion.T_current_previous.R()).norm();
     evidence.sigmas = motionDifference(tracking.motion.T_current_previous, prediction.T_current_previous, covariance);
+    evidence.trial = trial_.add(filter_->window(), P, inertial_->between(evidence.t - evidence.interval, evidence.t),
+                                tracking.motion, imu_noise_, gravity_);
+  } else {
+    trial_.reset();
   }
   return faults_.add(evidence);
 }
@@ -169,7 +162,10 @@ bool MotionSources::bridgesGap(const TrackingResult& tracking, std::size_t track
   return logSO3(apart.R()).norm() < kUsualMotion;
 }
 
-void MotionSources::start(double t_imu) { faults_.reset(t_imu); }
+void MotionSources::start(double t_imu, bool at_fault) {
+  faults_.reset(t_imu, at_fault);
+  trial_.reset();
+}
 
 void MotionSources::reset() { last_ = SE3(); }
 

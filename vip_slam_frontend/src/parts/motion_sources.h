@@ -9,6 +9,7 @@
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/front_end_options.h"
 #include "vip_slam_frontend/inertial/fault_detection.h"
+#include "vip_slam_frontend/inertial/imu_trial.h"
 #include "vip_slam_frontend/inertial/inertial_input.h"
 #include "vip_slam_frontend/tracking/dense_alignment.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
@@ -56,9 +57,7 @@ class MotionSources {
   /// Whether the IMU was at fault a moment before t (IMU clock).
   bool suspectImu(double t) const { return inertial_->complete() && faults_.suspects(t); }
   /// Whether the IMU is at fault in the interval before this image (fault_detection.h).
-  /// `implausible`: its noise has been widened beyond what an IMU has.
-  bool imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction, const Propagation& propagation,
-                    bool implausible);
+  bool imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction, const Propagation& propagation);
   /// Whether the IMU has contradicted the images from its first motion on, so that the vertical is not known.
   bool verticalUnknown() const { return faults_.verticalUnknown(); }
   /// Whether the image after a gap of IMU and images shows the motion in between: enough tracks have survived, and the
@@ -66,7 +65,8 @@ class MotionSources {
   static bool bridgesGap(const TrackingResult& tracking, std::size_t tracks_before, const PredictedMotion& prediction);
 
   /// The first state, at t_imu: until its velocity is confirmed, its error cannot be told from a shock.
-  void start(double t_imu);
+  /// `at_fault`: its IMU is wrong.
+  void start(double t_imu, bool at_fault);
   void reset();
 
  private:
@@ -76,6 +76,7 @@ class MotionSources {
   InertialInput* inertial_;
   DenseAlignment dense_;
   FaultDetection faults_;
+  ImuTrial trial_;
   SE3 last_;
 };
 

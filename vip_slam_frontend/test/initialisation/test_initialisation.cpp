@@ -19,7 +19,8 @@ namespace {
 struct Start {
   std::optional<FilterPrior> prior;
   double t = 0;
-  std::string reason;
+  std::string reason, accelerometer_fault;
+  frontend::Level level = frontend::Level::kAccelerometer;
 };
 
 struct StartOptions {
@@ -65,6 +66,8 @@ Start start(const StartOptions& o) {
     T_W_C_before = T_W_C;
     result.prior = initialiser.add(image, inertial);
     result.reason = initialiser.reason();
+    result.accelerometer_fault = initialiser.accelerometerFault();
+    result.level = initialiser.level();
   }
   return result;
 }
@@ -212,14 +215,23 @@ TEST(Initialiser, TheRobotBeginsAtTheOriginHeadingAlongX) {
   EXPECT_LT((prior.state.T_W_I.rotation() * up_imu - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
 }
 
-TEST(Initialiser, AnAccelerometerInUnitsOfGravityIsNamed) {
+// Images carry the start then; up is where the camera, or a floor in view, says.
+TEST(Initialiser, AnAccelerometerInUnitsOfGravityIsNamedAndNotUsed) {
   StartOptions options;
   options.speed = 0;
   options.accel_unit = 9.80665;
   const Start s = start(options);
-  EXPECT_FALSE(s.prior);
-  EXPECT_NE(s.reason.find("reads 1.0"), std::string::npos) << s.reason;
-  EXPECT_NE(s.reason.find("unit"), std::string::npos) << s.reason;
+  ASSERT_TRUE(s.prior);
+  EXPECT_FALSE(s.prior->standing);
+  EXPECT_EQ(s.level, frontend::Level::kCamera);
+  EXPECT_NE(s.accelerometer_fault.find("reads 1.0"), std::string::npos) << s.accelerometer_fault;
+  EXPECT_NE(s.accelerometer_fault.find("unit"), std::string::npos) << s.accelerometer_fault;
+  options.up = Eigen::Vector3d(0, -1, 0);
+  EXPECT_EQ(start(options).level, frontend::Level::kFloor);
+  options.accel_unit = 1;
+  const Start sound = start(options);
+  EXPECT_TRUE(sound.accelerometer_fault.empty()) << sound.accelerometer_fault;
+  EXPECT_EQ(sound.level, frontend::Level::kAccelerometer);
 }
 
 StillnessCues quiet() {

@@ -21,7 +21,7 @@ struct InitialisationInput {
   double t_imu = 0;
   int points = 0;                         ///< tracked points with depth
   bool surfaces = false;                  ///< enough flat patches in the depth image
-  std::optional<Eigen::Vector3d> up;      ///< in the camera, by a floor in view; only asked without an accelerometer
+  std::optional<Eigen::Vector3d> up;      ///< in the camera, by a floor in view; asked where no accelerometer tells it
   std::optional<SE3> T_current_previous;  ///< camera motion since the image before, where the images tell it
 };
 
@@ -36,6 +36,8 @@ class Initialiser {
   frontend::Level level() const { return level_; }
   /// Why it is still waiting.
   const std::string& reason() const { return reason_; }
+  /// What is wrong with the accelerometer, so that the last prior's vertical is not taken from it; empty: nothing.
+  const std::string& accelerometerFault() const { return accelerometer_fault_; }
   /// Extrinsics as estimated so far, instead of the configured ones.
   void setExtrinsics(const SE3& T_I_C) { T_I_C_ = T_I_C; }
   void reset();
@@ -52,6 +54,7 @@ class Initialiser {
   std::deque<InitialisationInput> images_;  ///< usable ones in a row
   frontend::Level level_ = frontend::Level::kAccelerometer;
   std::string reason_ = "waiting for images and IMU";
+  std::string accelerometer_fault_;
 };
 
 /// Changes the prior's position and yaw so that base_link, not the IMU, starts at the origin, heading along x.
