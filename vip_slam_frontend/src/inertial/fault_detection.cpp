@@ -42,7 +42,8 @@ bool FaultDetection::add(const MotionEvidence& e) {
   const bool tried = e.trial && e.trial->duration >= kMoment;
   const bool agrees = tried && e.trial->sigmas < kGateSigmas;
   const bool fault = begins || goes_on || (tried && e.trial->sigmas > trial_gate && e.t - disagreed_t_ > kFaultMemory);
-  if (fault || !agrees) agreed_ = 0;
+  // Images that cannot tell neither confirm nor contradict.
+  if (fault || (tried && !agrees)) agreed_ = 0;
   if (fault) {
     if (!isOnProbation(e.t)) first_fault_t_ = e.t;
     isolated_ = true;

@@ -147,8 +147,8 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
     admitMotionError(prediction.T_current_previous, kMotionError, &covariance);
     evidence.turn = logSO3(tracking.motion.T_current_previous.R()).norm();
     evidence.sigmas = motionDifference(tracking.motion.T_current_previous, prediction.T_current_previous, covariance);
-    evidence.trial = trial_.add(filter_->window(), P, inertial_->between(evidence.t - evidence.interval, evidence.t),
-                                tracking.motion, imu_noise_, gravity_);
+    evidence.trial = trial_.add(filter_->window(), P, inertial_->between(filter_->nav().t, evidence.t), tracking.motion,
+                                imu_noise_, gravity_);
   } else {
     trial_.reset();
   }

@@ -37,7 +37,7 @@ struct MotionEvidence {
 
 class FaultDetection {
  public:
-  /// Adds one interval; whether the IMU is at fault in it.
+  /// Adds one interval; whether the IMU is isolated in it, at fault or not believed again yet.
   bool add(const MotionEvidence& evidence);
   /// Whether the IMU was at fault a moment before `t`: the images' prediction is the better one then.
   bool suspects(double t) const { return isolated_ || t - last_fault_t_ < kMoment; }
