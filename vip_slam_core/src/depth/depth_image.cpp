@@ -81,6 +81,28 @@ bool isEdgeOnSlope(float low, float high, float slope_x, float slope_y, const De
          (high - low) * z * z > float(kEdgeSigmas * noise.sigma(z));
 }
 
+// Without a branch, where std::nth_element mispredicts every other one.
+inline void order(float& a, float& b) {
+  const float low = std::min(a, b);
+  b = std::max(a, b);
+  a = low;
+}
+
+// The median of z's N values and the N - 3 at `next`: the lowest and the highest of more than half of all values are
+// not the median, and are forgotten for one that has not been looked at.
+template <int N>
+float medianByForgetting(float* z, const float* next) {
+  for (int i = 0; i < N / 2; ++i) order(z[i], z[N - 1 - i]);
+  for (int i = 1; i < (N + 1) / 2; ++i) order(z[0], z[i]);
+  for (int i = N / 2; i < N - 1; ++i) order(z[i], z[N - 1]);
+  if constexpr (N == 3) {
+    return z[1];
+  } else {
+    z[0] = *next;
+    return medianByForgetting<N - 1>(z, next + 1);
+  }
+}
+
 // The common case, a full 5x5 window of valid pixels: the sums of the slope fit are constants and there are no branches
 // per pixel. False when some pixel is invalid: use the general case then.
 bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, const DepthNoise& noise, bool grazing,
@@ -126,8 +148,7 @@ bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, con
       return true;
     }
   }
-  std::nth_element(z, z + 12, z + 25);
-  *result = 1.0f / z[12];
+  *result = 1.0f / medianByForgetting<14>(z, z + 14);
   return true;
 }
 

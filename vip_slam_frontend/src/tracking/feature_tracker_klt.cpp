@@ -2,6 +2,7 @@
 // The feature tracker's optical flow: predicted starts, exposure, forward-backward check.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include <opencv2/video/tracking.hpp>
 
@@ -15,6 +16,26 @@ namespace vip_slam {
 namespace {
 
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
+
+struct Brightness {
+  double mean, deviation;  ///< grey levels
+};
+
+/// Of the wide patch around a pixel, which lies in the image. For patches as small as this cv::meanStdDev takes ten
+/// times as long.
+Brightness brightnessAround(const cv::Mat& gray, const Eigen::Vector2d& uv) {
+  constexpr int side = 2 * kWidePatch + 1, n = side * side;
+  int sum = 0, squares = 0;
+  for (int y = 0; y < side; ++y) {
+    const auto* row = gray.ptr<std::uint8_t>(cvRound(uv.y()) - kWidePatch + y) + cvRound(uv.x()) - kWidePatch;
+    for (int x = 0; x < side; ++x) {
+      sum += row[x];
+      squares += row[x] * row[x];
+    }
+  }
+  const double mean = static_cast<double>(sum) / n;
+  return {mean, std::sqrt(std::max(0.0, static_cast<double>(squares) / n - mean * mean))};
+}
 
 }  // namespace
 
@@ -33,18 +54,12 @@ void FeatureTracker::matchExposure(const cv::Mat& gray, const SE3& predicted, bo
     Eigen::Vector2d there;
     if (!predictMotion(track, predicted, has_translation, &there)) continue;
     if (!camera_->inImage(here, kWidePatch + 1) || !camera_->inImage(there, kWidePatch + 1)) continue;
-    const auto around = [](const Eigen::Vector2d& uv) {
-      return cv::Rect(cvRound(uv.x()) - kWidePatch, cvRound(uv.y()) - kWidePatch, 2 * kWidePatch + 1,
-                      2 * kWidePatch + 1);
-    };
-    cv::Scalar mean_last, deviation_last, mean, deviation;
-    cv::meanStdDev(gray_(around(here)), mean_last, deviation_last);
-    cv::meanStdDev(gray(around(there)), mean, deviation);
-    if (deviation_last[0] < 2.0 || deviation[0] < 1.0) continue;
-    gains.push_back(deviation[0] / deviation_last[0]);
-    contrasts.push_back(deviation_last[0]);
-    last.push_back(mean_last[0]);
-    now.push_back(mean[0]);
+    const Brightness patch_last = brightnessAround(gray_, here), patch = brightnessAround(gray, there);
+    if (patch_last.deviation < 2.0 || patch.deviation < 1.0) continue;
+    gains.push_back(patch.deviation / patch_last.deviation);
+    contrasts.push_back(patch_last.deviation);
+    last.push_back(patch_last.mean);
+    now.push_back(patch.mean);
   }
   if (gains.size() < kEnough) return;
   const double gain = upperMedian(gains);

@@ -29,7 +29,8 @@ class DepthUnit {
   /// does not show it, as a bare wall, is passed over, and the next one is compared.
   bool changes(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_odom_C, double t);
 
-  /// The next image is compared with this one, in the unit of the first ones and with its estimated pose.
+  /// The next image is compared with this one, in the unit of the first ones and with its estimated pose. `gray` is
+  /// kept and must stay as it is.
   void remember(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_odom_C, double t);
 
   /// A new epoch: poses have another frame. The unit stays.
@@ -38,10 +39,8 @@ class DepthUnit {
  private:
   struct Seen {
     Eigen::Vector3d point;  ///< odom, m
-    double brightness;      ///< about it; 0: there is no image
+    cv::Point pixel;
   };
-  /// The mean brightness about each pixel that is looked at; empty where there is no image.
-  cv::Mat coarse(const cv::Mat& gray) const;
 
   std::shared_ptr<const CameraModel> camera_;
   DepthNoise noise_;
@@ -49,6 +48,7 @@ class DepthUnit {
   double factor_ = 1;
   int step_;                  ///< px from one of them to the next
   std::vector<Seen> points_;  ///< of the last image
+  cv::Mat gray_;              ///< that image, or empty
   double t_ = 0;              ///< its time, s
   bool open_ = false;         ///< readings may have changed since: that image stays the one to compare with
 };
