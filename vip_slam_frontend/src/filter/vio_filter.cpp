@@ -161,6 +161,32 @@ void VioFilter::admitDispute() {
   filter_.inflate(N * sigmas.asDiagonal());
 }
 
+void VioFilter::admitRefuted(const RefutedMotion& refuted) {
+  const WindowState& window = filter_.window();
+  const int clones = static_cast<int>(window.clones.size());
+  const double begin = window.clones.back().t - refuted.seconds;
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(window.dimension(), 6 * clones);
+  for (int i = 0; i < clones; ++i) {
+    const double from = i > 0 ? std::max(begin, window.clones[i - 1].t) : begin;
+    if (window.clones[i].t <= from) continue;
+    const double share = std::sqrt((window.clones[i].t - from) / refuted.seconds);
+    const Eigen::Vector3d pivot = window.clones[std::max(0, i - 1)].T_W_I_fej.t();
+    Vector6d sigmas;
+    sigmas << Eigen::Vector3d::Constant(share * refuted.turn), Eigen::Vector3d::Constant(share * refuted.displacement);
+    auto by_interval = N.middleCols<6>(6 * i);
+    for (int k = i; k < clones; ++k) {
+      const SE3& T_W_I = window.clones[k].T_W_I_fej;
+      auto of_clone = by_interval.middleRows<6>(window.cloneColumn(k));
+      of_clone.topLeftCorner<3, 3>() = T_W_I.R().transpose();
+      of_clone.bottomLeftCorner<3, 3>() = -hat(T_W_I.t() - pivot);
+      of_clone.bottomRightCorner<3, 3>().setIdentity();
+    }
+    by_interval.middleRows<3>(window.navColumn()).leftCols<3>() = -hat(window.v_W_fej);
+    by_interval = by_interval * sigmas.asDiagonal();
+  }
+  filter_.inflate(N);
+}
+
 Matrix15d VioFilter::covarianceOfVertical() const {
   const NavState state = nav();
   Eigen::Matrix<double, 15, 3> by_turn = Eigen::Matrix<double, 15, 3>::Zero();
@@ -235,7 +261,9 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const double since = propagation.predicted.t - filter_.window().clones.back().t;
   const double delay_change =
       delay_before_ ? 0.0 : drift_.of(frontend::DriftMonitor::kDelay).density() * std::sqrt(since);
-  if (propagation.open && !after_open_) admitDispute();
+  const bool opens = propagation.open && !after_open_, refuted = opens && propagation.refuted.turn > 0;
+  if (opens) admitDispute();
+  if (refuted) admitRefuted(propagation.refuted);
   filter_.augment(propagation, id, delay_change);
 
   // From the second still image on, the newest clone replaces the one before: the window keeps what it knew of the
@@ -265,9 +293,9 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const Matrix15d P_predicted = covariance();
   const frontend::Estimate delay_predicted = filter_.window().calibration.time_offset ? delay() : frontend::Estimate{};
   const bool window_full = static_cast<int>(filter_.window().clones.size()) - (mark_kept_ ? 1 : 0) > options_.window;
-  // After an interval that left the motion open only images can measure the velocity: the first image after it updates
-  // with all tracks.
-  const bool all = after_open_ && !propagation.open;
+  // After an interval that left the motion open only images can measure the velocity, and after an inflation the
+  // motion: the first image after it updates with all tracks.
+  const bool all = refuted || (after_open_ && !propagation.open);
   after_open_ = propagation.open;
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full, all);
   if (!candidates.empty()) updateWithFeatures(candidates, all, &report);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_frontend/inertial/imu_trial.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "vip_slam_core/geometry/so3.h"
@@ -41,7 +42,13 @@ std::optional<TrialResult> ImuTrial::add(const WindowState& window, const Matrix
   const SE3 T_now_start = (propagation.predicted.T_W_I * T_I_C).inverse() * oldest.window.clones.back().T_W_I * T_I_C;
   Matrix6d covariance = oldest.covariance + motionCovariance(propagation, oldest.P, T_I_C);
   admitMotionError(T_now_start, 0.0, &covariance);
-  return TrialResult{oldest.duration(), motionDifference(oldest.T_now_start, T_now_start, covariance)};
+  TrialResult result{oldest.duration(), motionDifference(oldest.T_now_start, T_now_start, covariance)};
+  const Vector6d difference = oldest.T_now_start.boxminus(T_now_start);
+  constexpr double by_chance = 6;  // expected square, in sigmas
+  const double beyond = std::sqrt(std::max(0.0, 1 - by_chance / std::pow(std::max(result.sigmas, 1e-9), 2)));
+  refuted_ = last_;
+  last_ = {result.duration, beyond * difference.head<3>().norm(), beyond * difference.tail<3>().norm()};
+  return result;
 }
 
 }  // namespace vip_slam::frontend

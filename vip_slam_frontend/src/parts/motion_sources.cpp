@@ -122,6 +122,7 @@ Propagation MotionSources::byImages(double t_imu, const MotionFit& points, const
   J.bottomRightCorner<3, 3>() = -R_I_C * T_prev_cur.R();
   Propagation propagation = filter_->predict(T_I0_I1, J * covariance * J.transpose(), t_imu - from.t);
   propagation.open = fault;
+  propagation.refuted = trial_.refuted();
   return propagation;
 }
 

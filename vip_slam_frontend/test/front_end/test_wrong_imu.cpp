@@ -130,6 +130,29 @@ TEST(WrongImu, DegreesPerSecond) {
   });
 }
 
+// The images of before hold what the motion was until the fault is found, when what the IMU said of it is refuted.
+TEST(WrongImu, WhatAGyroInOtherAxesDidBeforeItWasFoundIsTakenBack) {
+  const CornerWorld world;
+  FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));
+  double imu_t = 0, found = 0, farthest = 0;
+  for (int k = 0; k < 100; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t < t + 0.03; imu_t += 0.005) {
+      ImuSample s = CornerWorld::imu(imu_t);
+      s.gyro = Eigen::Vector3d(s.gyro.y(), s.gyro.z(), s.gyro.x());
+      front_end.addImu(s);
+    }
+    const TrackedFramePtr frame = front_end.process(seen(world, t, t)).frame;
+    if (found == 0 && front_end.counters().imu_faults > 0) found = t;
+    if (found == 0) continue;
+    const Eigen::Vector3d error = frame->state.T_W_I.t() - CornerWorld::pose(t).t();
+    farthest = std::max(farthest, error.norm());
+  }
+  std::printf("found %.2f s after the motion began; then at most %.1f mm off\n", found - kStill, 1e3 * farthest);
+  ASSERT_GT(found, 0.0);
+  EXPECT_LT(farthest, 0.006);
+}
+
 // A bus that occasionally delivers one wrong sample: 30 m/s^2 for 5 ms are 15 cm/s.
 TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
   const CornerWorld world;

@@ -11,6 +11,13 @@
 
 namespace vip_slam {
 
+/// By how much the window's motion may be wrong that an IMU gave before it was found to be at fault, in one sigma of
+/// its sum.
+struct RefutedMotion {
+  double seconds = 0;                 ///< up to the newest clone
+  double turn = 0, displacement = 0;  ///< rad, m, along each axis
+};
+
 struct Propagation {
   NavState predicted;
   Matrix15d Phi = Matrix15d::Identity();
@@ -28,7 +35,8 @@ struct Propagation {
   bool inertial = true;  ///< by the IMU, not by what images and depth saw of the motion
   bool open =
       false;  ///< a stand-in took the IMU's place over this interval alone: the motion before and after is measured
-  RateHistory rates;  ///< the window's, extended to the end
+  RefutedMotion refuted;  ///< of an open one: what the IMU gave before
+  RateHistory rates;      ///< the window's, extended to the end
   /// Adds gapCovariance() to Q.
   void admitGap(double gap, double dt);
   /// Adds to Q a rotation at an unmeasured rate of one sigma `rate`, rad/s, for `dt` seconds.

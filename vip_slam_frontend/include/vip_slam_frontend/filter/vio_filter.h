@@ -206,6 +206,8 @@ class VioFilter {
   /// Adds what predictions and updates dispute to the covariance, as one motion of the whole window against the world
   /// and the marked clone.
   void admitDispute();
+  /// Inflates the window's motion over the refuted seconds: each interval errs on its own.
+  void admitRefuted(const RefutedMotion& refuted);
   /// After the updates of an image whose pose was `predicted`; `removed`: from the covariance, by them.
   void noteCorrection(const NavState& predicted, const Matrix15d& removed);
 

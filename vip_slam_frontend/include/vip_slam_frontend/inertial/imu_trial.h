@@ -10,6 +10,7 @@
 
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/propagation.h"
 #include "vip_slam_frontend/filter/window_state.h"
 #include "vip_slam_frontend/tracking/outlier_rejection.h"
 
@@ -28,8 +29,11 @@ class ImuTrial {
   /// the images. The result over up to half a second that ends with it; nothing when there are no samples.
   std::optional<TrialResult> add(const WindowState& window, const Matrix15d& P, const std::vector<ImuSample>& samples,
                                  const MotionFit& motion, const ImuNoise& noise, double gravity);
+  /// What the motion up to the newest interval may be wrong by, when the IMU is found to be at fault in that one: by
+  /// how much the trial before it differs beyond chance.
+  const RefutedMotion& refuted() const { return refuted_; }
   /// The next interval does not follow on the last one.
-  void reset() { starts_.clear(); }
+  void reset() { *this = ImuTrial(); }
 
  private:
   struct Start {
@@ -40,7 +44,8 @@ class ImuTrial {
     Matrix6d covariance = Matrix6d::Zero();  ///< of T_now_start, (theta, t)
     double duration() const { return samples.back().t - samples.front().t; }
   };
-  std::deque<Start> starts_;  ///< oldest first
+  std::deque<Start> starts_;      ///< oldest first
+  RefutedMotion last_, refuted_;  ///< by the newest trial, by the one before
 };
 
 }  // namespace vip_slam::frontend
