@@ -15,8 +15,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kViews = 15;
-constexpr double kPointSize = 0.05;   // metres
-constexpr double kTiltSigma = 0.003;  // radians: tilt of the odometry and of the map against gravity
+constexpr double kPointSize = 0.05;                                        // metres
 constexpr double kMinContradiction = 0.005, kUnknownContradiction = 0.05;  // of depth
 constexpr double kOccludedWeight = 0.25;
 constexpr std::size_t kEstablishedViews = 4;
@@ -48,8 +47,7 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
                           const PlaceVerifier& verifier, const std::function<bool(KeyframeId)>& allowed) {
   const CameraRig rig = rigOf(keyframes);
   const SE3 T_odom_B = cameraInOdom(*keyframes.back());
-  PlacePoseOptions pose_options = verifier.poseOptions();
-  pose_options.tilt_sigma = kTiltSigma;
+  const PlacePoseOptions& pose_options = verifier.poseOptions();
   const PlaceVerificationOptions& options = verifier.options();
   PlaceSupport support;
   support.T_W_C = T_W_odom * T_odom_B;

@@ -10,11 +10,13 @@
 #include "vip_slam_backend/loop/guided_matching.h"
 #include "vip_slam_backend/loop/place_matching.h"
 #include "vip_slam_backend/loop/scene_agreement.h"
-#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
+
+// Radians: tilt of the odometry and of the map against gravity.
+constexpr double kTiltSigma = 0.003;
 
 std::vector<KeyframeId> neighbourhood(const Map& map, KeyframeId match, int most,
                                       const std::function<bool(KeyframeId)>& allowed) {
@@ -38,6 +40,7 @@ PlaceVerifier::PlaceVerifier(const PlaceVerificationOptions& options, std::share
   pose_options_.iterations = options_.ransac_iterations;
   pose_options_.ransac_px = options_.ransac_px;
   pose_options_.inlier_px = options_.inlier_px;
+  pose_options_.tilt_sigma = kTiltSigma;
 }
 
 void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G_I, const SE3& start,
@@ -75,14 +78,6 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
   const double sigma = std::sqrt(covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
   if (!(sigma <= options_.max_sigma_position)) {
     result->reason = formatted("position is known to %.3f m only, needs %.3f", sigma, options_.max_sigma_position);
-    return;
-  }
-  const double tilt = std::acos(std::clamp((result->T_W_I.rotation().conjugate() * Eigen::Vector3d::UnitZ())
-                                               .dot(T_G_I.rotation().conjugate() * Eigen::Vector3d::UnitZ()),
-                                           -1.0, 1.0)) /
-                      kDegree;
-  if (tilt > options_.max_gravity_deg) {
-    result->reason = formatted("pose is tilted %.1f deg against gravity, at most %.1f", tilt, options_.max_gravity_deg);
     return;
   }
   const MapKeyframe& match = map.keyframe(result->match);

@@ -22,7 +22,6 @@ struct PlaceVerificationOptions {
   double guided_radius = 10.0;
   double inlier_px = 3.0;
   double max_sigma_position = 0.05;
-  double max_gravity_deg = 2.0;
   double min_depth_agreement = 0.6;
   double max_see_through = 0.12;
 
@@ -39,7 +38,6 @@ struct PlaceVerificationOptions {
     v.field("guided_radius", guided_radius, 1.0, 50.0, "search radius around a projected landmark, px");
     v.field("inlier_px", inlier_px, 0.5, 20.0, "largest reprojection error of a final inlier, px per octave scale");
     v.field("max_sigma_position", max_sigma_position, 0.001, 1.0, "largest one-sigma of the relative position, m");
-    v.field("max_gravity_deg", max_gravity_deg, 0.1, 45.0, "largest tilt between the found pose and gravity, degrees");
     v.field("min_depth_agreement", min_depth_agreement, 0.0, 1.0, "fraction of common depth that must agree");
     v.field("max_see_through", max_see_through, 0.0, 1.0,
             "fraction of common depth that may lie behind the other's surface");

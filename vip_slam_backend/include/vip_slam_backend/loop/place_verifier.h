@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Geometric verification that a keyframe shows a place of the map: descriptor matches by the direct index, RANSAC with
-// depth and gravity, guided matching of the neighbourhood's landmarks, refinement, and independent checks by gravity
-// and depth.
+// depth and gravity, guided matching of the neighbourhood's landmarks, refinement with gravity, and an independent check
+// by depth.
 #pragma once
 
 #include <functional>
