@@ -2,62 +2,59 @@
 #include "vip_slam_backend/map/culling.h"
 
 #include <algorithm>
-#include <map>
 #include <set>
+#include <utility>
 
 namespace vip_slam {
 namespace {
 
 // With this many views a landmark is kept however often it was not found: predictions do not model occlusion, and the
-// views of its own track count neither as predicted nor as found.
+// views of its own track count neither as predicted nor as found. One view of a landmark or plane with as many is
+// redundant.
 constexpr std::size_t kProven = 4;
 
-constexpr int kJudged = 10;                // keyframes judged that just left the window, and as many older ones in turn
-constexpr std::size_t kSmallMap = 3;       // times above_covisible: smaller maps have no crowds, since they cost little
-constexpr std::size_t kAtOnce = 2;         // removed from crowds per call, since each removal changes the crowd
-constexpr double kLongest = 10.0;          // largest factor on max_imu_seconds, in a crowd
-constexpr int kTies = 5;                   // loops between two odometries whose ends are kept
-constexpr std::size_t kSeenElsewhere = 4;  // views of a landmark for which one view is redundant
+constexpr std::size_t kSmallMap = 3;  // times above_covisible: smaller maps have no crowds, since they cost little
+constexpr std::size_t kAtOnce = 2;    // removed from crowds per call, since each removal changes the crowd
 
-/// Keyframes to judge now, oldest first: those that just left the window, and a share of the older ones in turn.
+/// Keyframes to judge now, oldest first: as many as are in the window of those that just left it, and as many of the
+/// older ones in turn.
 std::vector<KeyframeId> candidates(const Map& map, int window) {
   std::vector<KeyframeId> ids;
   for (const auto& entry : map.keyframes()) ids.push_back(entry.first);
-  const int older = static_cast<int>(ids.size()) - window - kJudged;
+  const int older = static_cast<int>(ids.size()) - 2 * window;
   std::vector<KeyframeId> list;
   if (older > 0) {
-    const int parts = (older + kJudged - 1) / kJudged, part = static_cast<int>(ids.back() % KeyframeId(parts));
+    const int parts = (older + window - 1) / window, part = static_cast<int>(ids.back() % KeyframeId(parts));
     for (int k = part; k < older; k += parts) list.push_back(ids[static_cast<std::size_t>(k)]);
   }
   list.insert(list.end(), ids.begin() + std::max(0, older), ids.end() - window);
   return list;
 }
 
-/// Ends of the oldest few loops between each two odometries, which would be separate parts of the map without them.
+/// Ends of the oldest loop between each two odometries, which would be separate parts of the map without them.
 std::set<KeyframeId> endsOfTies(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> count;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> tied;
   std::set<KeyframeId> ends;
   for (const auto& [query, match] : loops) {
     if (!map.hasKeyframe(query) || !map.hasKeyframe(match)) continue;
     const std::uint32_t a = map.keyframe(query).data->frame.epoch, b = map.keyframe(match).data->frame.epoch;
-    if (a == b || ++count[std::minmax(a, b)] > kTies) continue;
+    if (a == b || !tied.insert(std::minmax(a, b)).second) continue;
     ends.insert(query);
     ends.insert(match);
   }
   return ends;
 }
 
-/// Whether at least three other keyframes observe the plane; searched from the neighbours in time, which mostly do.
+/// Whether enough other keyframes observe the plane; searched from the neighbours in time, which mostly do.
 bool isHeldByOthers(PlaneId plane, const MapKeyframe& kf, const Map& map) {
-  constexpr int kEnough = 3;
-  int others = 0;
+  std::size_t views = 1;
   const auto here = map.keyframes().find(kf.id());
   auto before = here, after = std::next(here);
-  while (others < kEnough && (before != map.keyframes().begin() || after != map.keyframes().end())) {
-    if (before != map.keyframes().begin()) others += (--before)->second.planes.count(plane) != 0;
-    if (after != map.keyframes().end()) others += (after++)->second.planes.count(plane) != 0;
+  while (views < kProven && (before != map.keyframes().begin() || after != map.keyframes().end())) {
+    if (before != map.keyframes().begin()) views += (--before)->second.planes.count(plane) != 0;
+    if (after != map.keyframes().end()) views += (after++)->second.planes.count(plane) != 0;
   }
-  return others >= kEnough;
+  return views >= kProven;
 }
 
 /// Whether enough landmarks and all planes are seen elsewhere; landmarks with fewer than `proven` views do not count.
@@ -67,7 +64,7 @@ bool isRedundant(const MapKeyframe& kf, const Map& map, double redundancy, std::
     if (landmark == kNoLandmark) continue;
     const std::size_t views = map.landmark(landmark).observations.size();
     total += views >= proven;
-    redundant += views >= kSeenElsewhere;
+    redundant += views >= kProven;
   }
   if (total < 20 || redundant < redundancy * total) return false;
   // A keyframe whose planes too few others observe stays.
@@ -118,10 +115,10 @@ std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window,
     if (kf.loop_keyframe && (crowd <= 1 || ties.count(id) != 0)) continue;
     // With a fixed limit on the IMU factor a room's keyframes would grow with the time spent there. The limit rises
     // steeply, so that keyframes outside crowds keep their IMU factors.
-    const double longest = options.max_imu_seconds * std::clamp(crowd * crowd * crowd, 1.0, kLongest);
+    const double longest = options.max_imu_seconds * std::max(crowd * crowd * crowd, 1.0);
     if (map->joinedSeconds(kf) > longest) continue;
     // In a crowd a landmark that only few keyframes saw is a mismatch or has moved.
-    if (!isRedundant(kf, *map, options.redundancy, crowd > 1 ? kSeenElsewhere : 1)) continue;
+    if (!isRedundant(kf, *map, options.redundancy, crowd > 1 ? kProven : 1)) continue;
     map->removeKeyframe(id, noise, longest);
     removed.push_back(id);
     out_of_crowds += crowd > 1;

@@ -42,7 +42,7 @@ TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
   for (const bool two_odometries : {false, true}) {
     Map map = back_end.map();
     for (KeyframeId id = 1; id <= 90; ++id) map.keyframe(id).loop_keyframe = true;
-    // The keyframes that could be culled are the ends of the oldest loops.
+    // The keyframes that could be culled are the ends of loops.
     std::vector<std::pair<KeyframeId, KeyframeId>> loops;
     for (const KeyframeId id : thinned) loops.emplace_back(90, id);
     if (two_odometries) {
@@ -60,8 +60,7 @@ TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
       for (const KeyframeId id : cullKeyframes(culling, 20, ImuNoise(), loops, &map)) removed.push_back(id);
     EXPECT_EQ(checkMap(map), "");
     EXPECT_FALSE(removed.empty());
-    if (two_odometries)
-      for (std::size_t k = 0; k < 5; ++k) EXPECT_TRUE(map.hasKeyframe(thinned.at(k))) << thinned[k];
+    if (two_odometries) EXPECT_TRUE(map.hasKeyframe(thinned.front())) << thinned.front();  // the oldest ties them
     thinned = removed;
   }
 }

@@ -20,7 +20,7 @@ int cullLandmarks(KeyframeId recent, Map* map);
 /// ones in turn) may go; else only a few at a time that share landmarks with too many keyframes (a crowd), where
 /// landmarks with fewer views do not count. Never removed: the first and last of an IMU chain, one that too few others
 /// replace on a plane, one whose removal would make an IMU factor too long, or the end of a loop (in a crowd only the
-/// ends of the oldest few loops between each two odometries, which tie these). `loops`: (query, match), oldest first.
+/// ends of the oldest loop between each two odometries, which ties these). `loops`: (query, match), oldest first.
 std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise,
                                       const std::vector<std::pair<KeyframeId, KeyframeId>>& loops, Map* map);
 
