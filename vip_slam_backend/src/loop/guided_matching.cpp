@@ -6,7 +6,7 @@
 #include <limits>
 #include <set>
 
-#include "vip_slam_backend/loop/place_matching.h"
+#include "vip_slam_backend/map/feature_grid.h"
 
 namespace vip_slam {
 namespace {
@@ -70,7 +70,7 @@ GuidedMatches matchGuided(const Map& map, const std::vector<Feature>& features, 
     int distance = std::numeric_limits<int>::max();
     const MapPoint* point = nullptr;
   };
-  const FeatureGrid grid(features, camera.width(), camera.height());
+  const FeatureGrid grid(features, camera.width(), camera.height(), radius);
   const SE3 T_C_W = T_W_C.inverse();
   std::vector<Best> best(features.size());
   for (const MapPoint& point : points) {
@@ -79,7 +79,7 @@ GuidedMatches matchGuided(const Map& map, const std::vector<Feature>& features, 
     if (p_C.z() < 0.1 || !camera.project(p_C, &uv) || !camera.inImage(uv)) continue;
     int first = std::numeric_limits<int>::max(), second = first;
     std::uint32_t nearest = 0;
-    for (const std::uint32_t candidate : grid.near(uv, radius)) {
+    grid.around(uv, [&](std::uint32_t candidate) {
       const int distance = distanceOf(map, point, features[candidate].descriptor, looks);
       const bool rival = first < std::numeric_limits<int>::max() &&
                          (looks == GuidedLooks::kStrict ||
@@ -91,7 +91,7 @@ GuidedMatches matchGuided(const Map& map, const std::vector<Feature>& features, 
       } else if (rival && distance < second) {
         second = distance;
       }
-    }
+    });
     if (first > max_hamming || first > kRatio * second || first >= best[nearest].distance) continue;
     best[nearest] = {first, &point};
   }

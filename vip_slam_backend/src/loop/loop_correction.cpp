@@ -14,13 +14,13 @@
 #include "vip_slam_backend/loop/loop_evidence.h"
 #include "vip_slam_backend/loop/loop_fusion.h"
 #include "vip_slam_backend/loop/scene_agreement.h"
+#include "vip_slam_backend/map/views.h"
 #include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr int kFusedNeighbours = 8;
-constexpr double kSight = 3.0;  // m: a view shows a place that far from the camera
 
 std::set<KeyframeId> withNeighbours(const Map& map, KeyframeId id, std::size_t most) {
   std::set<KeyframeId> result{id};

@@ -86,25 +86,4 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> matchByDirectIndex(const st
   return matches;
 }
 
-FeatureGrid::FeatureGrid(const std::vector<Feature>& features, int width, int height)
-    : features_(features), cols_(width / kCell + 1), rows_(height / kCell + 1) {
-  cells_.resize(static_cast<std::size_t>(cols_) * rows_);
-  for (std::uint32_t k = 0; k < features.size(); ++k) {
-    const int c = std::clamp(static_cast<int>(features[k].pixel.x()) / kCell, 0, cols_ - 1);
-    const int r = std::clamp(static_cast<int>(features[k].pixel.y()) / kCell, 0, rows_ - 1);
-    cells_[static_cast<std::size_t>(r) * cols_ + c].push_back(k);
-  }
-}
-
-std::vector<std::uint32_t> FeatureGrid::near(const Eigen::Vector2d& pixel, double radius) const {
-  std::vector<std::uint32_t> found;
-  const auto cell = [](double v, int n) { return std::clamp(static_cast<int>(std::floor(v / kCell)), 0, n - 1); };
-  for (int r = cell(pixel.y() - radius, rows_); r <= cell(pixel.y() + radius, rows_); ++r)
-    for (int c = cell(pixel.x() - radius, cols_); c <= cell(pixel.x() + radius, cols_); ++c)
-      for (const std::uint32_t k : cells_[static_cast<std::size_t>(r) * cols_ + c])
-        if ((features_[k].pixel.cast<double>() - pixel).squaredNorm() <= radius * radius) found.push_back(k);
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
 }  // namespace vip_slam

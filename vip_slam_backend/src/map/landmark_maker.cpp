@@ -5,15 +5,13 @@
 
 #include <Eigen/Dense>
 
-#include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/significance.h"
 
 namespace vip_slam {
 
 namespace {
 
-constexpr double kGate = 12.0;               // px; a known track farther than this from its projection is not added
-constexpr double kMinParallax = 1.0;         // degrees between the two outermost rays, for triangulation
-constexpr double kTriangulationError = 3.0;  // px; largest reprojection error of a triangulated point
+constexpr double kGate = 12.0;  // px; a known track farther than this from its projection is not added
 
 }  // namespace
 
@@ -81,7 +79,6 @@ bool LandmarkMaker::triangulate(const Map& map, const std::vector<MapObservation
   // Mid-point of all rays: sum (I - r r^T)(p - c) = 0.
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
-  std::vector<Eigen::Vector3d> rays;
   for (const MapObservation& o : views) {
     const SE3 T_W_C = map.keyframe(o.keyframe).T_W_C();
     const Eigen::Vector2f& xy = map.feature(o).xy;
@@ -89,19 +86,18 @@ bool LandmarkMaker::triangulate(const Map& map, const std::vector<MapObservation
     const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - ray * ray.transpose();
     A += P;
     b += P * T_W_C.t();
-    rays.push_back(ray);
   }
-  double smallest = 1;
-  for (std::size_t i = 0; i < rays.size(); ++i)
-    for (std::size_t j = i + 1; j < rays.size(); ++j) smallest = std::min(smallest, rays[i].dot(rays[j]));
-  if (smallest > std::cos(kMinParallax * kDegree)) return false;
+  // Rays that are off by a pixel move the point along them by its distance over the root of A's least eigenvalue, in
+  // pixels of the focal length: it must be in front of the cameras beyond noise.
+  const double parallax = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A, Eigen::EigenvaluesOnly).eigenvalues()(0);
+  if (!(std::sqrt(parallax) * focal_ > kNoiseSigmas)) return false;
   *p_W = A.ldlt().solve(b);
   if (!p_W->allFinite()) return false;
   for (const MapObservation& o : views) {
     const Eigen::Vector3d p = map.keyframe(o.keyframe).T_W_C().inverse() * *p_W;
     if (p.z() < 0.1 || p.z() > 50) return false;
     const Eigen::Vector2d error = p.head<2>() / p.z() - map.feature(o).xy.cast<double>();
-    if (error.norm() * focal_ > kTriangulationError) return false;
+    if (error.norm() * focal_ > kNoiseSigmas) return false;
   }
   return true;
 }

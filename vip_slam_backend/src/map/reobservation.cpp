@@ -5,44 +5,11 @@
 #include <cmath>
 #include <set>
 
+#include "vip_slam_backend/map/feature_grid.h"
 #include "vip_slam_backend/map/views.h"
 
 namespace vip_slam {
 namespace {
-
-// Features in cells of the image.
-class FeatureGrid {
- public:
-  FeatureGrid(const std::vector<Feature>& features, int width, int height, double cell)
-      : cell_(cell),
-        cols_(static_cast<int>(width / cell) + 1),
-        rows_(static_cast<int>(height / cell) + 1),
-        cells_(static_cast<std::size_t>(cols_) * rows_),
-        features_(features) {
-    for (std::uint32_t k = 0; k < features.size(); ++k)
-      cells_[index(features[k].pixel.x(), features[k].pixel.y())].push_back(k);
-  }
-
-  template <class Visit>
-  void around(const Eigen::Vector2d& uv, double radius, Visit visit) const {
-    const int c0 = column(uv.x() - radius), c1 = column(uv.x() + radius);
-    const int r0 = row(uv.y() - radius), r1 = row(uv.y() + radius);
-    for (int r = r0; r <= r1; ++r)
-      for (int c = c0; c <= c1; ++c)
-        for (const std::uint32_t k : cells_[static_cast<std::size_t>(r) * cols_ + c])
-          if ((features_[k].pixel.cast<double>() - uv).squaredNorm() <= radius * radius) visit(k);
-  }
-
- private:
-  int column(double u) const { return std::clamp(static_cast<int>(u / cell_), 0, cols_ - 1); }
-  int row(double v) const { return std::clamp(static_cast<int>(v / cell_), 0, rows_ - 1); }
-  std::size_t index(double u, double v) const { return static_cast<std::size_t>(row(v)) * cols_ + column(u); }
-
-  double cell_;
-  int cols_, rows_;
-  std::vector<std::vector<std::uint32_t>> cells_;
-  const std::vector<Feature>& features_;
-};
 
 constexpr double kMaxViewAngle = 1.0;  // radians between the ray then and now
 constexpr double kMaxDistanceRatio = 2.0;
@@ -78,7 +45,7 @@ ReobservationResult Reobservation::process(KeyframeId id, Map* map,
       if (landmark != kNoLandmark) candidates.insert(landmark);
   for (const LandmarkId own : kf.landmarks) candidates.erase(own);
 
-  const FeatureGrid grid(features, camera_->width(), camera_->height(), 2 * options_.radius);
+  const FeatureGrid grid(features, camera_->width(), camera_->height(), options_.radius);
   const SE3 T_W_C = kf.T_W_C(), T_C_W = T_W_C.inverse();
   for (const LandmarkId landmark_id : candidates) {
     const MapLandmark* landmark = map->findLandmark(landmark_id);
@@ -94,7 +61,7 @@ ReobservationResult Reobservation::process(KeyframeId id, Map* map,
     ++result.candidates;
     int best = options_.max_hamming + 1, second = 256;
     std::uint32_t best_feature = 0;
-    grid.around(uv, options_.radius, [&](std::uint32_t k) {
+    grid.around(uv, [&](std::uint32_t k) {
       const Feature& f = features[k];
       if (f.depth > 0 && std::abs(f.depth - p_C.z()) > 4 * f.depth_sigma + 0.03 * p_C.z()) return;
       const int distance = hammingDistance(f.descriptor, landmark->descriptor);

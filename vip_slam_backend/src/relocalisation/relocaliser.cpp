@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_backend/relocalisation/relocaliser.h"
 
-#include <cmath>
+#include "vip_slam_backend/map/views.h"
 
 namespace vip_slam {
 namespace {
@@ -31,23 +31,9 @@ std::optional<Relocalisation> Relocaliser::relocalise(const Map& map, const Loop
 std::optional<Relocalisation> Relocaliser::track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
                                                  const SE3& T_W_I,
                                                  const std::function<bool(KeyframeId)>& allowed) const {
-  // The nearest keyframe with a similar viewing direction.
-  const SE3 T_W_C = T_W_I * keyframe.frame.T_I_C;
-  const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
-  KeyframeId nearest = 0;
-  double best = 6.0;
-  for (const auto& entry : map.keyframes()) {
-    if (allowed && !allowed(entry.first)) continue;
-    const SE3 other = entry.second.T_W_C();
-    const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
-    const double cost = (other.t() - T_W_C.t()).norm() + 4.0 * (1.0 - cosine);
-    if (cosine > 0.5 && cost < best) {
-      best = cost;
-      nearest = entry.first;
-    }
-  }
-  if (nearest == 0) return std::nullopt;
-  const PlaceVerification place = places.verifier().track(map, keyframe, T_W_I, nearest, allowed);
+  const auto nearest = viewsAlong(map, T_W_I * keyframe.frame.T_I_C, 1, allowed);
+  if (nearest.empty()) return std::nullopt;
+  const PlaceVerification place = places.verifier().track(map, keyframe, T_W_I, nearest.front(), allowed);
   if (!place.accepted) return std::nullopt;
   return fromPlace(place);
 }

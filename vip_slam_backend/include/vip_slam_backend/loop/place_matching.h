@@ -20,18 +20,4 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> matchByDirectIndex(const st
                                                                         const DirectIndex& index_b,
                                                                         const PlaceVerificationOptions& options);
 
-/// Finds features near a pixel: buckets of a keyframe's features.
-class FeatureGrid {
- public:
-  FeatureGrid(const std::vector<Feature>& features, int width, int height);
-  /// Indices of features within `radius` px of `pixel`, ascending.
-  std::vector<std::uint32_t> near(const Eigen::Vector2d& pixel, double radius) const;
-
- private:
-  static constexpr int kCell = 32;
-  const std::vector<Feature>& features_;
-  int cols_, rows_;
-  std::vector<std::vector<std::uint32_t>> cells_;
-};
-
 }  // namespace vip_slam

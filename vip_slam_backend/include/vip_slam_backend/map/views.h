@@ -10,6 +10,9 @@
 
 namespace vip_slam {
 
+/// How far from the camera lies what a view shows, m.
+constexpr double kSight = 3.0;
+
 /// Whether two poses are the same place, within the differences of two matches of it.
 inline bool samePlace(const SE3& a, const SE3& b) {
   return (a.t() - b.t()).norm() < 0.3 && a.rotation().angularDistance(b.rotation()) < 0.2;
