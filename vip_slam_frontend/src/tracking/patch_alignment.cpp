@@ -42,18 +42,21 @@ inline float bilinear(const cv::Mat& image, float x, float y) {
 template <int side>
 bool Patch<side>::sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp) {
   float* out = framed;
+  float u[side + 2], v[side + 2];
+  const auto right = static_cast<float>(image.cols - 1), bottom = static_cast<float>(image.rows - 1);
   for (int y = 0; y < side + 2; ++y) {
     const double dy = y - side / 2 - 1;
     const Eigen::Vector2d begin = pixel + warp(0, dy), slope = warp.A.col(0) + warp.xy * dy, bend = 0.5 * warp.xx;
     for (int x = 0; x < side + 2; ++x) {
       const double dx = x - side / 2 - 1;
-      const Eigen::Vector2d p = begin + (slope + bend * dx) * dx;
-      const auto u = static_cast<float>(p.x()), v = static_cast<float>(p.y());
-      // A double just inside may round to the last column or row, which has no neighbour to interpolate with.
-      if (!(u >= 0) || !(v >= 0) || u >= static_cast<float>(image.cols - 1) || v >= static_cast<float>(image.rows - 1))
-        return false;
-      *out++ = bilinear(image, u, v);
+      u[x] = static_cast<float>(begin.x() + (slope.x() + bend.x() * dx) * dx);
+      v[x] = static_cast<float>(begin.y() + (slope.y() + bend.y() * dx) * dx);
     }
+    // A double just inside may round to the last column or row, which has no neighbour to interpolate with.
+    bool inside = true;
+    for (int x = 0; x < side + 2; ++x) inside &= (u[x] >= 0) & (v[x] >= 0) & (u[x] < right) & (v[x] < bottom);
+    if (!inside) return false;
+    for (int x = 0; x < side + 2; ++x) *out++ = bilinear(image, u[x], v[x]);
   }
   return true;
 }

@@ -21,17 +21,16 @@ constexpr double kPriorSlope = 0.03;
 constexpr double kLineFloor = 0.0003;
 constexpr int kFewestOfLine = 3;
 
-/// Readings in one row or column of the window.
+/// Sums over the readings in one row or column of the window; `along` is their coordinate in it.
 struct Line {
-  Eigen::Vector3d row = Eigen::Vector3d::Zero();
+  int count = 0, along = 0, squares = 0;
   double value = 0;
-  int count = 0;
 
-  void add(const Eigen::Vector3d& r, double v) { row += r, value += v, ++count; }
-  /// Squared deviation of the mean from the plane over its variance.
-  double chi2(const Eigen::Vector3d& fit, double sigma) const {
+  void add(int a, double v) { ++count, along += a, squares += a * a, value += v; }
+  /// Squared deviation of the mean over its variance; `fitted`: sum of what the plane has at the readings.
+  double chi2(double fitted, double sigma) const {
     if (count < kFewestOfLine) return 0;
-    const double mean = (value - row.dot(fit)) / count;
+    const double mean = (value - fitted) / count;
     return mean * mean / (sigma * sigma / count + kLineFloor * kLineFloor);
   }
 };
@@ -47,12 +46,11 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
 
   // Least squares on depth / z = offset + slope . d, in units of the noise of one reading.
   const double sigma = std::max(noise.sigma(depth) / depth, 1e-4);
-  Eigen::Matrix3d A = Eigen::Vector3d(0, 1, 1).asDiagonal();
-  A *= sigma * sigma / (kPriorSlope * kPriorSlope);
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double square = 0;
-  int count = 0, foreign = 0;
-  std::array<Line, 2 * radius / kStride + 1> rows, columns;
+  int foreign = 0;
+  constexpr int lines = 2 * radius / kStride + 1;
+  std::array<Line, lines> rows, columns;
   for (int y = -radius; y <= radius; y += kStride) {
     const float* row = depth_image.ptr<float>(v + y) + u;
     for (int x = -radius; x <= radius; x += kStride) {
@@ -62,17 +60,27 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
         ++foreign;
         continue;
       }
-      const Eigen::Vector3d row_of_A(1.0, x, y);
       const double value = depth / z - 1.0;
-      A += row_of_A * row_of_A.transpose();
-      b += row_of_A * value;
+      b += Eigen::Vector3d(1.0, x, y) * value;
       square += value * value;
-      ++count;
-      rows[(y + radius) / kStride].add(row_of_A, value);
-      columns[(x + radius) / kStride].add(row_of_A, value);
+      rows[(y + radius) / kStride].add(x, value);
+      columns[(x + radius) / kStride].add(y, value);
     }
   }
-  if (count < kMinValid * rows.size() * columns.size() || foreign > (1 - kGateProbability) * count) return surface;
+  int count = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (int i = 0; i < lines; ++i) {
+    const int v_of_row = i * kStride - radius;
+    count += rows[i].count;
+    x += rows[i].along;
+    y += columns[i].along;
+    xx += rows[i].squares;
+    xy += v_of_row * rows[i].along;
+    yy += columns[i].squares;
+  }
+  if (count < kMinValid * lines * lines || foreign > (1 - kGateProbability) * count) return surface;
+  const double prior = sigma * sigma / (kPriorSlope * kPriorSlope);
+  Eigen::Matrix3d A;
+  A << count, x, y, x, xx + prior, xy, y, xy, yy + prior;
   const Eigen::Vector3d fit = A.ldlt().solve(b);
   const double residual = std::sqrt(std::max(0.0, square - b.dot(fit)) / count);
   // With a step or an edge inside the window the fit is no plane, and its slope would be worse than none.
@@ -80,8 +88,13 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
   // A step or a bend that single readings hide in their noise shows in the means of rows and columns. On a plane they
   // deviate by less than what a residual may without losing weight.
   double chi2 = 0;
-  for (std::size_t i = 0; i < rows.size(); ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
-  const int dof = 2 * static_cast<int>(rows.size()) - 4;
+  for (int i = 0; i < lines; ++i) {
+    const Line &row = rows[i], &column = columns[i];
+    const int at = i * kStride - radius;
+    chi2 += row.chi2(row.count * (fit(0) + at * fit(2)) + row.along * fit(1), sigma) +
+            column.chi2(column.count * (fit(0) + at * fit(1)) + column.along * fit(2), sigma);
+  }
+  const int dof = 2 * lines - 4;
   if (chi2 > kHuberSigmas * kHuberSigmas * dof) return surface;
   surface.slope = fit.tail<2>();
   surface.known = true;
