@@ -7,9 +7,16 @@
 #include <Eigen/Eigenvalues>
 
 #include "vip_slam_backend/loop/place_pose.h"
+#include "vip_slam_core/depth/depth_noise.h"
 
 namespace vip_slam {
 namespace {
+
+constexpr double kHuber = 1.5;
+
+double huberWeight(double absolute) { return absolute <= kHuber ? 1.0 : kHuber / absolute; }
+
+double depthWeight(const PlaceMatch& match) { return 1.0 / (match.depth_sigma + 0.005); }
 
 class Refinement {
  public:
@@ -38,10 +45,10 @@ class Refinement {
     H->setZero();
     g->setZero();
     const Eigen::Matrix3d R_B_W = T_W_B.R().transpose();
-    const double huber = 1.5;
+    const double huber = kHuber;
     double cost = 0;
     const auto add = [&](double r, const Eigen::Matrix<double, 1, 6>& J) {
-      const double w = std::abs(r) <= huber ? 1.0 : huber / std::abs(r);
+      const double w = huberWeight(std::abs(r));
       *H += w * J.transpose() * J;
       *g += w * r * J.transpose();
       cost += std::abs(r) <= huber ? r * r : 2 * huber * std::abs(r) - huber * huber;
@@ -59,7 +66,7 @@ class Refinement {
       add(weight * (p.x() * iz - m.xy.x()), weight * iz * (dp.row(0) - p.x() * iz * dp.row(2)));
       add(weight * (p.y() * iz - m.xy.y()), weight * iz * (dp.row(1) - p.y() * iz * dp.row(2)));
       if (m.depth > 0) {
-        const double depth_weight = 1.0 / (m.depth_sigma + 0.005);
+        const double depth_weight = depthWeight(m);
         add(depth_weight * (p.z() - m.depth), depth_weight * dp.row(2));
       }
     }
@@ -78,6 +85,34 @@ class Refinement {
       for (int i = 0; i < 3; ++i) add((up(i) - up_B_(i)) / options_.tilt_sigma, J.row(i) / options_.tilt_sigma);
     }
     return cost;
+  }
+
+  // Information at T_W_B of the estimate with the normal equations H, in which depths count as independent: with rows
+  // J_k, weighted and whitened, and errors of covariance C that they share it has the covariance
+  // H^-1 (H + sum J_k^T C_kl J_l) H^-1.
+  Matrix6d information(const std::vector<std::uint32_t>& use, const SE3& T_W_B, const Matrix6d& H) const {
+    std::vector<Vector6d> rows;
+    std::vector<Eigen::Vector3d> bearings;
+    const Eigen::Matrix3d R_B_W = T_W_B.R().transpose();
+    for (const std::uint32_t k : use) {
+      const PlaceMatch& m = matches_[k];
+      if (!(m.depth > 0)) continue;
+      const Eigen::Matrix3d& R_C_B = R_C_B_[m.camera];
+      const Eigen::Vector3d p_B = R_B_W * (m.p_W - T_W_B.t());
+      const Eigen::Vector3d p = R_C_B * (p_B - rig_[m.camera].t());
+      if (p.z() < 0.05) continue;
+      const double weight = depthWeight(m), whitened = std::abs(weight * (p.z() - m.depth));
+      Vector6d row;
+      row << (R_C_B * hat(p_B)).row(2).transpose(), -(R_C_B * R_B_W).row(2).transpose();
+      rows.push_back(weight * weight * huberWeight(whitened) * options_.depth_shared * m.depth_sigma * row);
+      bearings.push_back(p_B.normalized());
+    }
+    Matrix6d shared = Matrix6d::Zero();
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      for (std::size_t l = 0; l < rows.size(); ++l)
+        shared +=
+            std::exp(-(bearings[k] - bearings[l]).norm() / kDepthCorrelationLength) * rows[k] * rows[l].transpose();
+    return H * (H + shared).ldlt().solve(H);
   }
 
   // Levenberg-Marquardt over `use`. False when it breaks down.
@@ -134,6 +169,7 @@ PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRi
   refinement.linearise(result.inliers, result.T_W_B, &result.information, &g);
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(result.information);
   result.found = result.inliers.size() >= 3 && eigen.eigenvalues()(0) > 1.0;
+  if (result.found) result.information = refinement.information(result.inliers, result.T_W_B, result.information);
   return result;
 }
 

@@ -47,7 +47,8 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
                           const PlaceVerifier& verifier, const std::function<bool(KeyframeId)>& allowed) {
   const CameraRig rig = rigOf(keyframes);
   const SE3 T_odom_B = cameraInOdom(*keyframes.back());
-  const PlacePoseOptions& pose_options = verifier.poseOptions();
+  PlacePoseOptions pose_options = verifier.poseOptions();
+  pose_options.depth_shared = sharedByTwo(keyframes.back()->depth_noise);
   const PlaceVerificationOptions& options = verifier.options();
   PlaceSupport support;
   support.T_W_C = T_W_odom * T_odom_B;

@@ -46,6 +46,8 @@ PlaceVerifier::PlaceVerifier(const PlaceVerificationOptions& options, std::share
 void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G_I, const SE3& start,
                            const std::vector<KeyframeId>& around, PlaceVerification* result) const {
   SE3 T_W_C = start;
+  PlacePoseOptions pose_options = pose_options_;
+  pose_options.depth_shared = sharedByTwo(query.depth_noise);
   GuidedMatches guided;
   PlacePose pose;
   const std::vector<MapPoint> points = mapPointsOf(map, around);
@@ -53,7 +55,7 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
     guided = matchGuided(map, query.frame.features, T_W_C, factor * options_.guided_radius, points, *camera_,
                          options_.max_hamming, GuidedLooks::kStrict);
     pose = refinePlacePose(guided.matches, singleCamera(), T_W_C, T_G_I.rotation() * query.frame.T_I_C.rotation(),
-                           pose_options_);
+                           pose_options);
     result->inliers = static_cast<int>(pose.inliers.size());
     if (result->inliers < options_.min_ransac_inliers) {
       result->reason =

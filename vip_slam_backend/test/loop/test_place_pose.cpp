@@ -180,6 +180,44 @@ TEST_F(PlacePoseTest, ABareWallHoldsTheYawThatFewCornersLeaveUncertain) {
   EXPECT_LT(held, 0.25 * free);
 }
 
+TEST_F(PlacePoseTest, DepthsThatShareTheirErrorAreNotWorthTheirNumber) {
+  PlacePoseOptions options;
+  const double shared = 1.0;  // in sigmas of a reading: one error for the whole image
+  double nees = 0, as_independent = 0;
+  const int trials = 200;
+  for (int trial = 0; trial < trials; ++trial) {
+    make(60, 1.0, true);
+    const double common = normal(shared);
+    for (PlaceMatch& m : matches_) {
+      // Corners in the middle of a wall, where one error is shared by all.
+      const Eigen::Vector2d xy(uniform(-0.02, 0.02), uniform(-0.02, 0.02));
+      m.xy = xy + Eigen::Vector2d(normal(1), normal(1)) / options.focal;
+      const double z = uniform(3.8, 4.2);
+      m.p_W = T_W_C_ * Eigen::Vector3d(xy.x() * z, xy.y() * z, z);
+      m.depth_sigma = 0.02;
+      m.depth = z + normal(m.depth_sigma) + common * m.depth_sigma;
+    }
+    const auto along = [&](const PlacePose& pose) {
+      const Matrix6d covariance = pose.information.inverse();
+      const Eigen::Vector3d axis = T_W_C_.R().col(2);
+      return std::pow(axis.dot(pose.T_W_B.t() - T_W_C_.t()), 2) / axis.dot(covariance.bottomRightCorner<3, 3>() * axis);
+    };
+    options.tilt_sigma = 0.003;
+    options.depth_shared = 0;
+    const PlacePose independent = refinePlacePose(matches_, singleCamera(), T_W_C_, R_G_C_, options);
+    options.depth_shared = shared;
+    const PlacePose pose = refinePlacePose(matches_, singleCamera(), T_W_C_, R_G_C_, options);
+    ASSERT_TRUE(independent.found && pose.found);
+    EXPECT_TRUE(independent.T_W_B.t().isApprox(pose.T_W_B.t()));  // it is said what the estimate is worth
+    nees += along(pose) / trials;
+    as_independent += along(independent) / trials;
+  }
+  std::printf("error along the view over its variance: %.2f; depths as independent: %.2f\n", nees, as_independent);
+  EXPECT_GT(nees, 0.5);
+  EXPECT_LT(nees, 1.5);
+  EXPECT_GT(as_independent, 10.0);
+}
+
 TEST_F(PlacePoseTest, SameSeedSameAnswer) {
   make(80, 0.4, true);
   const PlacePose a = ransacPlacePose(matches_, singleCamera(), R_G_C_, {}),

@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "vip_slam_core/depth/depth_noise.h"
+
 namespace vip_slam::frontend {
 namespace {
 

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/filter/qr.h"
 #include "vip_slam_frontend/filter/shared_depth.h"
@@ -128,7 +129,7 @@ void whitenShared(const std::vector<SurfacePair>& pairs, const std::vector<int>&
   for (int k = 0; k < n; ++k) {
     const int below = n - k;
     const Eigen::ArrayXd apart = ((x.tail(below) - x(k)).square() + (y.tail(below) - y(k)).square()).sqrt();
-    covariance.col(k).tail(below) = shared(k) * shared.tail(below) * (apart / -frontend::kDepthCorrelationLength).exp();
+    covariance.col(k).tail(below) = shared(k) * shared.tail(below) * (apart / -kDepthCorrelationLength).exp();
   }
   covariance.diagonal().array() += 1;
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(covariance);  // in place

@@ -40,6 +40,7 @@ struct PlacePoseOptions {
   double ransac_px = 4.0;
   double inlier_px = 3.0;     ///< after refinement
   double depth_sigmas = 4.0;  ///< gate on depth
+  double depth_shared = 0;    ///< error that depths of one surface have in common, as a share of their sigma
   double tilt_sigma = 0;      ///< of the refined attitude's tilt against the given one, radians; 0: tilt is free
   std::uint64_t seed = 1;
 };
@@ -48,7 +49,8 @@ struct PlacePose {
   bool found = false;
   SE3 T_W_B;
   std::vector<std::uint32_t> inliers;  ///< ascending
-  /// Information of the perturbation (theta, t) of T_W_B, with pixel noise of one pixel.
+  /// Information of the perturbation (theta, t) of T_W_B, with pixel noise of one pixel; depths that share their error
+  /// are not worth their number.
   Matrix6d information = Matrix6d::Zero();
 };
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Geometric verification that a keyframe shows a place of the map: descriptor matches by the direct index, RANSAC with
-// depth and gravity, guided matching of the neighbourhood's landmarks, refinement with gravity, and an independent check
-// by depth.
+// depth and gravity, guided matching of the neighbourhood's landmarks, refinement with gravity, and an independent
+// check by depth.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -16,6 +17,7 @@
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/place_recognition/keyframe_database.h"
 #include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_noise.h"
 
 namespace vip_slam {
 
@@ -30,6 +32,9 @@ struct PlaceVerification {
   double depth_agreement = -1;  ///< -1: no depth to compare
   std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< inliers: feature of the query, landmark of the map
 };
+
+/// Error that depths of a surface share in two images of one camera together, as a share of a reading's sigma.
+inline double sharedByTwo(const DepthNoiseParts& noise) { return std::sqrt(2 * noise.shared); }
 
 class PlaceVerifier {
  public:

@@ -47,6 +47,10 @@ struct DepthNoiseParts {
   bool isUsable() const { return white > 0 && std::isfinite(white) && shared >= 0 && std::isfinite(shared); }
 };
 
+/// Distance in the image, in normalised coordinates, over which the correlation of the shared part falls by e: 64 px of
+/// a Kinect, an Xtion and a LiDAR phone.
+constexpr double kDepthCorrelationLength = 0.12;
+
 /// Correlation of the shared errors of one place in two images that are so many seconds apart.
 double sharedDepth(double seconds);
 

@@ -10,10 +10,6 @@
 
 namespace vip_slam::frontend {
 
-/// Distance in the image, in normalised coordinates, over which the correlation of the shared part falls by e: 64 px of
-/// a Kinect, an Xtion and a LiDAR phone.
-constexpr double kDepthCorrelationLength = 0.12;
-
 /// A row of a system for a depth, in sigmas of the reading's own error.
 struct DepthRow {
   int row = 0;
