@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Cholesky>
 
@@ -18,6 +19,9 @@ namespace {
 constexpr double kGravitySigma = 0.002;  // relative, variation over the earth
 // Beyond this share the estimate is linearised too far away to be entered anywhere.
 constexpr double kLargeDifference = 0.05;
+
+// Parts of a recording that are left out in turn.
+constexpr std::size_t kParts = 8;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -134,25 +138,60 @@ class ScaleFit {
   int rows_ = 0;
 };
 
-ScaleFit fitScale(const Map& map, double gravity, double random_walk, double pose_variance) {
-  ScaleFit fit(gravity, pose_variance);
+/// A keyframe of this session with the one before it, where an IMU factor joins the two.
+struct Interval {
+  const MapKeyframe *before, *keyframe;
+};
+
+std::vector<Interval> intervalsOf(const Map& map) {
+  std::vector<Interval> intervals;
   const MapKeyframe* before = nullptr;
   for (const auto& [id, kf] : map.keyframes()) {
     if (kf.stored) continue;
-    if (before && kf.previous == before->id() && kf.preintegration)
-      fit.add(before->state, kf.state, *kf.preintegration, random_walk);
-    else
-      fit.begin();
+    if (before && kf.previous == before->id() && kf.preintegration) intervals.push_back({before, &kf});
     before = &kf;
+  }
+  return intervals;
+}
+
+ScaleFit fitScale(const std::vector<Interval>& intervals, double gravity, double random_walk, double pose_variance) {
+  ScaleFit fit(gravity, pose_variance);
+  const MapKeyframe* last = nullptr;
+  for (const Interval& i : intervals) {
+    if (i.before != last) fit.begin();
+    fit.add(i.before->state, i.keyframe->state, *i.keyframe->preintegration, random_walk);
+    last = i.keyframe;
   }
   fit.solve();
   return fit;
 }
 
+/// The jackknife's sigma: what the estimate varies by when each part of the recording is left out in turn. It shows
+/// what a single interval has decided, as one whose poses are off. 0: without some part the scale is not known.
+template <class Fit>
+double jackknifeSigma(const std::vector<Interval>& intervals, const Fit& fit) {
+  const std::size_t parts = std::min(intervals.size(), kParts);
+  std::vector<double> factors;
+  for (std::size_t part = 0; part < parts; ++part) {
+    const auto begin = static_cast<std::ptrdiff_t>(part * intervals.size() / parts);
+    const auto end = static_cast<std::ptrdiff_t>((part + 1) * intervals.size() / parts);
+    std::vector<Interval> others(intervals.begin(), intervals.begin() + begin);
+    others.insert(others.end(), intervals.begin() + end, intervals.end());
+    const InertialScale scale = fit(others).scale();
+    if (scale.sigma == 0) return 0;
+    factors.push_back(scale.factor);
+  }
+  double mean = 0, squares = 0;
+  for (const double factor : factors) mean += factor / static_cast<double>(parts);
+  for (const double factor : factors) squares += (factor - mean) * (factor - mean);
+  return std::sqrt(squares * static_cast<double>(parts - 1) / static_cast<double>(parts));
+}
+
 }  // namespace
 
 InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& noise) {
-  const auto fitWith = [&](double variance) { return fitScale(map, gravity, noise.accel_random_walk, variance); };
+  const std::vector<Interval> intervals = intervalsOf(map);
+  const auto fitWith = [&](double variance) { return fitScale(intervals, gravity, noise.accel_random_walk, variance); };
   // The poses' variance is the one for which the residuals are consistent. The misfit is about linear in it.
   double low = 0, high = leastCovariance(Matrix6::Zero())(5, 5);
   double below = fitWith(low).misfit(), above = fitWith(high).misfit();
@@ -161,7 +200,15 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
     below = std::exchange(above, fitWith(high).misfit());
   }
   const double share = below < 1 && above > below ? std::min(1.0, (1 - below) / (above - below)) : 0.0;
-  return fitWith(low + share * (high - low)).scale();
+  const double variance = low + share * (high - low);
+  InertialScale scale = fitWith(variance).scale();
+  if (scale.sigma == 0) return scale;
+  const double varies = jackknifeSigma(intervals, [&](const std::vector<Interval>& others) {
+    return fitScale(others, gravity, noise.accel_random_walk, variance);
+  });
+  if (varies == 0) return {};
+  scale.sigma = std::max(scale.sigma, varies);
+  return scale;
 }
 
 bool isLarge(const InertialScale& scale) {

@@ -150,6 +150,25 @@ TEST(InertialScale, GravityOfThePlaceIsNoScale) {
   EXPECT_NEAR(scale.factor, 1, 4 * scale.sigma);
 }
 
+// As after a blow: one keyframe lies where it is not.
+TEST(InertialScale, WhatOneIntervalDecidesIsNotSure) {
+  for (const unsigned seed : {1, 2, 3, 4, 5, 6}) {
+    Walk w;
+    w.seconds = 8;
+    w.swing = 0.2;
+    w.seed = seed;
+    Map map = walk(w);
+    const KeyframeId wrong = 7;
+    NavState state = map.keyframe(wrong).state;
+    state.T_W_I = SE3(state.T_W_I.rotation(), Eigen::Vector3d(state.T_W_I.t() + Eigen::Vector3d(0.02, 0.02, 0)));
+    map.moveKeyframes({{wrong, state.T_W_I}});
+    const InertialScale scale = inertialScale(map, 9.81, imuNoise());
+    EXPECT_GT(std::abs(scale.factor - 1), 0.05);
+    EXPECT_LT(std::abs(scale.factor - 1), 2 * scale.sigma) << scale.factor;
+    EXPECT_EQ(scaleDifference(scale, SensorConfig()), "");
+  }
+}
+
 TEST(InertialScale, NothingIsKnownWithoutMotion) {
   Walk still;
   still.swing = 0;
