@@ -15,7 +15,7 @@ constexpr double kBelievable = 25.0;
 
 // Covariance of the odometry's state without position: the absolute position is not known, but cancels in the relative
 // motion of the two keyframes.
-Matrix15d doubt(const Keyframe& keyframe) {
+Matrix15d stateCovariance(const Keyframe& keyframe) {
   Matrix15d P = keyframe.frame.covariance;
   P.middleRows<3>(3).setZero();
   P.middleCols<3>(3).setZero();
@@ -30,8 +30,8 @@ double imuNoiseFactor(const MapKeyframe& previous, const MapKeyframe& keyframe, 
   const Eigen::Matrix<double, 9, 1> off =
       keyframe.preintegration->residual(previous.data->frame.state, keyframe.data->frame.state, G, &J_i, &J_j, false)
           .head<9>();
-  const Matrix15d S = keyframe.preintegration->covariance() + J_i * doubt(*previous.data) * J_i.transpose() +
-                      J_j * doubt(*keyframe.data) * J_j.transpose();
+  const Matrix15d S = keyframe.preintegration->covariance() + J_i * stateCovariance(*previous.data) * J_i.transpose() +
+                      J_j * stateCovariance(*keyframe.data) * J_j.transpose();
   const double square = off.dot(S.topLeftCorner<9, 9>().ldlt().solve(off)) / 9.0;
   return std::isfinite(square) ? std::sqrt(std::max(1.0, square / kBelievable)) : 1.0;
 }

@@ -24,7 +24,7 @@ void FaultDetection::reset(double t, bool at_fault) {
   *this = FaultDetection();
   isolated_ = at_fault;
   if (at_fault) first_fault_t_ = last_fault_t_ = t;
-  doubt_t_ = t;
+  unconfirmed_t_ = t;
 }
 
 bool FaultDetection::add(const MotionEvidence& e) {
@@ -32,8 +32,8 @@ bool FaultDetection::add(const MotionEvidence& e) {
   const bool contradicts = e.images_agree && e.sigmas > (suspects(e.t) ? kGateSigmas : kBeyond);
   if (!e.images_agree) disagreed_t_ = e.t;
   if (!e.images_agree || deviates) {
-    if (e.t - doubt_t_ > kMoment) began_t_ = e.t;
-    doubt_t_ = e.t;
+    if (e.t - unconfirmed_t_ > kMoment) began_t_ = e.t;
+    unconfirmed_t_ = e.t;
   }
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;

@@ -62,7 +62,7 @@ bool Health::resume(const Sight& sight) {
   return true;
 }
 
-std::string Health::doubts(const Sight& sight) const {
+std::string Health::degradation(const Sight& sight) const {
   if (sight.t_imu - silent_imu_t_ < kMoment) return "no IMU samples: held by images and depth";
   if (sight.t_imu - fault_t_ < kMoment) {
     if (!imu_fault_.empty()) return imu_fault_ + " Held by images and depth";
@@ -93,7 +93,7 @@ void Health::judge(const Sight& sight) {
     if (lost()) return;
     last_good_t_ = last_held_t_ = sight.t;
     last_good_variance_ = sight.variance;
-    const std::string why = doubts(sight);
+    const std::string why = degradation(sight);
     status_ = {why.empty() ? TrackingState::kTracking : TrackingState::kDegraded, why};
     return;
   }

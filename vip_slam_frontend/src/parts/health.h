@@ -73,7 +73,7 @@ class Health {
   bool contradictedForLong(const Sight& sight) const;
   void judge(const Sight& sight);
   /// What limits a pose that features hold; empty: nothing.
-  std::string doubts(const Sight& sight) const;
+  std::string degradation(const Sight& sight) const;
 
   RecoveryOptions options_;
   FrontEndCounters* counters_;

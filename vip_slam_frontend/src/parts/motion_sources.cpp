@@ -57,17 +57,17 @@ Eigen::Vector3d MotionSources::rate(double t) const {
   return sample ? correctedRate(sample->gyro, filter_->window().gyro_correction) : Eigen::Vector3d::Zero();
 }
 
-PredictedMotion MotionSources::byImu(const Propagation& propagation, const SE3& T_odom_C, bool doubtful, bool wary,
+PredictedMotion MotionSources::byImu(const Propagation& propagation, const SE3& T_odom_C, bool imu_missing, bool wary,
                                      bool at_rest) const {
   const NavState& from = filter_->nav();
   PredictedMotion motion;
   motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * filter_->extrinsics());
   motion.sigma = propagation.displacementSigma(filter_->covariance());
   motion.interval = propagation.predicted.t - from.t;
-  motion.turn_unknown = doubtful;
+  motion.turn_unknown = imu_missing;
   motion.wary = wary;
   motion.at_rest = at_rest;
-  motion.judges = !doubtful;
+  motion.judges = !imu_missing;
   return motion;
 }
 

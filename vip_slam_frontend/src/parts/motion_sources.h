@@ -37,9 +37,9 @@ class MotionSources {
   SE3 byGyro(double t0, double t1) const;
   /// The IMU's rate at t (IMU clock), rad/s, bias included; the nearest one outside of what is buffered.
   Eigen::Vector3d rate(double t) const;
-  /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt, `doubtful`, it
-  /// does not judge the points. `wary`: a moving body was seen lately; `at_rest`: by the IMU.
-  PredictedMotion byImu(const Propagation& propagation, const SE3& T_odom_C, bool doubtful, bool wary,
+  /// The camera's motion since the last image as predicted by the IMU. Where samples are missing or cut off,
+  /// `imu_missing`, it does not judge the points. `wary`: a moving body was seen lately; `at_rest`: by the IMU.
+  PredictedMotion byImu(const Propagation& propagation, const SE3& T_odom_C, bool imu_missing, bool wary,
                         bool at_rest) const;
   /// Whether all pixels see another turn than `predicted`, which is too large for optical flow to find the difference.
   bool isAnotherTurn(const AlignedMotion& seen, const SE3& predicted) const;

@@ -16,7 +16,7 @@ namespace vip_slam {
 namespace {
 
 // The gyro's rotation is rejected when it explains less than a third of at least this many pairs ...
-constexpr int kMinToDoubt = 15;
+constexpr int kMinForOutliers = 15;
 // ... and a motion with a free rotation explains two thirds of them. Less could belong to a moving body.
 
 Eigen::Vector3d bearing(const Eigen::Vector2d& xy) { return {xy.x(), xy.y(), 1.0}; }
@@ -195,11 +195,11 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
   result.T_current_previous = T;
   result.ok = result.inliers >= 5;
   const int n = static_cast<int>(pairs.size());
-  const bool doubtful = n >= kMinToDoubt && 3 * result.inliers < n && !bounded;
-  if (!doubtful && !options.turn_unknown) return result;
+  const bool mostly_outliers = n >= kMinForOutliers && 3 * result.inliers < n && !bounded;
+  if (!mostly_outliers && !options.turn_unknown) return result;
   GeneralMotion general = poseFromDepth(pairs, predicted, options);
   if (!general.ok) return result;
-  if (doubtful ? 3 * general.inliers > 2 * n : general.inliers > result.inliers) {
+  if (mostly_outliers ? 3 * general.inliers > 2 * n : general.inliers > result.inliers) {
     result.ok = true;
     result.free_rotation = true;
     result.with_depth = true;

@@ -54,7 +54,7 @@ class FaultDetection {
   double first_fault_t_ = -1e300, last_fault_t_ = -1e300;  ///< of those that came back on probation
   double disagreed_t_ = -1e300;                            ///< images among themselves
   double recovered_t_ = -1e300;                            ///< end of the last isolation
-  double doubt_t_ = -1e300;                                ///< last interval that deviated, or that gave no test
+  double unconfirmed_t_ = -1e300;                          ///< last interval that deviated, or that gave no test
   double began_t_ = -1e300;  ///< first such interval after agreement: a fault may begin there
   bool isolated_ = false;
   double agreed_ = 0;          ///< for how long trials have agreed, while isolated, s
