@@ -149,6 +149,7 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("drift of the gyroscope's bias in use, times the configured random walk", c.gyro_walk);
   status.add("drift of the accelerometer's bias in use, times the configured random walk", c.accel_walk);
   status.add("depth noise that a surface shares, times the configured", c.depth_shared);
+  status.add("images that contradict the IMU", c.imu_contradicted);
   status.add("camera's delay in use (ms)", 1e3 * shown.calibration.time_offset);
   status.add("extrinsics", shown.extrinsics);
   for (const std::string& difference : shown.calibration_differences) status.add("calibration", difference);

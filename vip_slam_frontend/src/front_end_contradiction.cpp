@@ -16,6 +16,16 @@
 
 namespace vip_slam {
 
+namespace {
+
+// Factor on the IMU's noise that no sound IMU reaches: with wrong axes, signs or units the adapted factor goes to its
+// limit of 30, while extrinsics that are wrong by a degree or a delay of 10 ms leave it at 1.
+constexpr double kImplausibleNoise = 10.0;
+
+}  // namespace
+
+bool FrontEnd::Impl::imuIsContradicted() const { return filter_.imuNoiseScale() > kImplausibleNoise; }
+
 bool FrontEnd::Impl::movesByImu(double t_imu, const SE3& T_odom_C_then) const {
   if (!rest_.imuIsQuiet(inertial_, filter_.nav().t, t_imu)) return true;
   const std::vector<ImuSample> samples = inertial_.between(filter_.nav().t, t_imu);

@@ -98,6 +98,7 @@ class FrontEnd::Impl {
   SurfaceMatches matchSurfaces(const ImageStep& step);
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
+  bool imuIsContradicted() const;
   /// Whether the pixels equal those of the image before although the IMU says that the camera moved.
   bool repeatsLastImage(const cv::Mat& gray, double t_imu) const;
   /// Whether the IMU predicts visible image motion between the camera pose T_odom_C_then and the image at t_imu.

@@ -130,7 +130,7 @@ bool FrontEnd::Impl::addAccel(double t, const Eigen::Vector3d& accel) {
 
 void FrontEnd::Impl::followDepthUnit(ImageStep* step) {
   // A pose that images and IMU contradict says nothing of distances.
-  if (sources_.suspectImu(step->t_imu)) return;
+  if (imuIsContradicted() || sources_.suspectImu(step->t_imu)) return;
   const std::optional<NavState> predicted = inertial_.complete() ? predict(step->t_imu) : std::nullopt;
   const SE3 T_odom_C =
       predicted ? predicted->T_W_I * extrinsics() : filter_.nav().T_W_I * extrinsics() * sources_.last().inverse();

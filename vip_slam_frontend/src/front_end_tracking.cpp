@@ -176,6 +176,7 @@ void FrontEnd::Impl::updateFilter(ImageStep* step) {
   counters_.accel_walk = imu_noise.accel_walk;
   counters_.depth_white = surfaces_.learnt().white();
   counters_.depth_shared = surfaces_.learnt().shared();
+  counters_.imu_contradicted += step->sight.contradicts_imu;
   if (report.rows > 0) counters_.nis_per_dof = report.nis / report.rows;
 }
 
@@ -193,8 +194,8 @@ frontend::Sight FrontEnd::Impl::sight(const ImageStep& step) const {
   sight.moves_by_itself = step.tracked.moves_by_itself;
   sight.surfaces_hold = step.report.surfaces_used > 0;
   sight.still = rest_.still();
+  sight.contradicts_imu = imuIsContradicted();
   sight.blind = step.no_imu;
-  sight.imu_at_fault = sources_.suspectImu(step.t_imu);
   sight.vertical_unknown = sources_.verticalUnknown();
   sight.scale_contradicts = filter_.scaleContradicts();
   sight.disputed = step.report.disputed;

@@ -51,6 +51,7 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
                                                              {"zero_velocity", c.zero_velocity},
                                                              {"coasting", c.coasting},
                                                              {"moving", c.moving},
+                                                             {"imu_contradicted", c.imu_contradicted},
                                                              {"lost", c.lost},
                                                              {"features_used", c.features_used},
                                                              {"features_gated", c.features_gated},

@@ -98,7 +98,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(
         std::to_string(c.imu_faults) + " of " + std::to_string(c.images) +
         " images show a motion that the IMU contradicts, and were tracked without it: shocks, shaking, saturation, or "
-        "axes, signs, units or T_imu_cam that are wrong? check_bag tells");
+        "axes, signs or units that are wrong?");
   if (c.repeated_image > 0)
     all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
                   " images repeat the pixels of the one before under a new stamp and are left out: a camera slower "
@@ -132,6 +132,10 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   if (pipeline.images() == 0) all.push_back("no image could be used");
   for (const std::string& missing : {lateStart(pipeline), missingPoses(pipeline), otherStates(pipeline.states())})
     if (!missing.empty()) all.push_back(missing);
+  if (c.imu_contradicted > 0)
+    all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
+                  " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
+                  "signs and units, T_imu_cam, the stamps and the scale of depth right? check_bag tells");
   if (c.level != frontend::Level::kAccelerometer && pipeline.images() > 0)
     all.push_back(
         formatted("without an accelerometer the vertical is that of %s%s", frontend::levelName(c.level),

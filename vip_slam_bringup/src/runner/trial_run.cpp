@@ -41,7 +41,8 @@ Findings trialRun(BagSet bags, SensorConfig sensor, double seconds) {
 
   Findings all;
   const FrontEndCounters& counters = pipeline.frontEnd().counters();
-  const auto contradicting = static_cast<std::size_t>(std::min(counters.images, counters.imu_faults));
+  const auto contradicting =
+      static_cast<std::size_t>(std::min(counters.images, counters.imu_faults + counters.imu_contradicted));
   if (counters.imuIsWrong())
     all.push_back({Severity::kError, "odometry",
                    formatted("the IMU and what is seen contradict each other in %zu of %zu images, why is not known",

@@ -59,6 +59,7 @@ struct FrontEndCounters {
   std::uint64_t coasting = 0;          ///< images passed on the IMU alone
   std::uint64_t moving = 0;            ///< images in which most of the view moved independently of the camera
   std::uint64_t lost = 0;              ///< times the state went to LOST
+  std::uint64_t imu_contradicted = 0;  ///< images that contradict the IMU by more than any plausible noise of it
   std::uint64_t features_used = 0, features_gated = 0;
   std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
@@ -73,7 +74,7 @@ struct FrontEndCounters {
   /// Learnt noise of depth on surfaces, as factors on the configured noise: of single patches, and common to a surface.
   double depth_white = 1, depth_shared = 1;
   /// Whether so many images contradict the IMU that what was learnt against it, such as its delay, is worth nothing.
-  bool imuIsWrong() const { return 10 * imu_faults > images; }
+  bool imuIsWrong() const { return 10 * (imu_faults + imu_contradicted) > images; }
 };
 
 class FrontEnd {

@@ -63,6 +63,10 @@ bool Health::resume(const Sight& sight) {
 }
 
 std::string Health::degradation(const Sight& sight) const {
+  if (sight.contradicts_imu) {
+    return "the images contradict the IMU: are its axes, signs and units, T_imu_cam, the stamps and the scale of depth "
+           "right? check_bag tells";
+  }
   if (sight.t_imu - silent_imu_t_ < kMoment) return "no IMU samples: held by images and depth";
   if (sight.t_imu - fault_t_ < kMoment) {
     if (!imu_fault_.empty()) return imu_fault_ + " Held by images and depth";
@@ -100,7 +104,7 @@ void Health::judge(const Sight& sight) {
   if (sight.surfaces_hold && !lost()) last_held_t_ = sight.t;
   counters_->coasting += !sight.surfaces_hold;
   // Without an IMU, or with one that is wrong, neither images nor samples tell the motion.
-  const double patience = sight.blind || sight.imu_at_fault ? options_.longestImuGap() : options_.coast_seconds;
+  const double patience = sight.blind || sight.contradicts_imu ? options_.longestImuGap() : options_.coast_seconds;
   if (!lost() && (sight.t - last_held_t_ > patience || coastedSigma(sight.variance) > options_.max_position_sigma)) {
     phase_ = Phase::kLost;
     ++counters_->lost;

@@ -21,8 +21,8 @@ struct Sight {
   bool moves_by_itself = false;     ///< what is seen moves independently of the camera
   bool surfaces_hold = false;       ///< depth surfaces measured the motion
   bool still = false;               ///< the body stands still
+  bool contradicts_imu = false;     ///< the IMU's adapted noise is implausible
   bool blind = false;               ///< no IMU tells the motion
-  bool imu_at_fault = false;        ///< a moment before
   bool vertical_unknown = false;    ///< the IMU contradicts from its first motion on
   bool scale_contradicts = false;   ///< the accelerometer is sure of another scale of depth, beyond belief
   bool disputed = false;            ///< predictions and updates of the last second contradict each other

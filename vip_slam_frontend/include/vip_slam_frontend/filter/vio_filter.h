@@ -113,6 +113,7 @@ class VioFilter {
   /// The pose of motionSinceMark() without the cost of its covariance; empty when nothing was marked.
   std::optional<SE3> poseSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
+  double imuNoiseScale() const { return imu_monitor_.scale(); }  ///< on the densities
   ImuNoiseScale imuNoise() const;
   /// Adopted offset of the readings of depth, m, and the factor on them.
   double depthCorrection() const { return evidence_.adopted(kDepthOffset); }
