@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "jackknife.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/util/significance.h"
@@ -17,8 +18,6 @@ namespace vip_slam {
 
 using PlaneSet = std::map<PlaneId, const Plane*>;
 
-/// Keyframes are left out in so many groups to find a fit's scatter; it takes keyframes for half of them.
-constexpr int kGroups = 20;
 /// Rounds of reweighting and relinearisation.
 constexpr int kFitRounds = 4;
 /// Prior sigma of what depth is off by, m and share.

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -46,19 +48,12 @@ double fit(const Keyframes& keyframes, const PlaneSet& planes, const DepthNoise&
   return x(2);
 }
 
-/// Standard deviation of the fit, 1/m, by the jackknife: each time another group of keyframes is left out. All points
-/// of a keyframe share its pose's error, so that points do not count, keyframes do. What the normal equations say would
-/// be too small, as a redescending loss is not a square: with poses that are off by 2 cm, half of what it is.
+/// Standard deviation of the fit, 1/m, by the jackknife over keyframes. All points of a keyframe share its pose's
+/// error, so that points do not count, keyframes do. What the normal equations say would be too small, as a
+/// redescending loss is not a square: with poses that are off by 2 cm, half of what it is.
 double sigmaOfFit(const Keyframes& keyframes, const PlaneSet& planes, const DepthNoise& noise) {
-  const int groups = std::min(kGroups, static_cast<int>(keyframes.size()));
-  Eigen::VectorXd without(groups);
-  for (int group = 0; group < groups; ++group) {
-    Keyframes rest;
-    for (std::size_t k = 0; k < keyframes.size(); ++k)
-      if (static_cast<int>(k) % groups != group) rest.push_back(keyframes[k]);
-    without(group) = fit(rest, planes, noise);
-  }
-  return std::sqrt((groups - 1.0) / groups) * (without.array() - without.mean()).matrix().norm();
+  const auto without = [&](const Keyframes& others) { return std::make_optional(fit(others, planes, noise)); };
+  return jackknifeSigma(keyframes, without).value_or(std::numeric_limits<double>::infinity());
 }
 
 }  // namespace

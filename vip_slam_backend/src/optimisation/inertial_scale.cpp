@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
 
+#include "jackknife.h"
 #include "odometry_factors.h"
 #include "vip_slam_backend/factors/motion_prior.h"
 #include "vip_slam_core/util/formatted.h"
@@ -19,9 +21,6 @@ namespace {
 constexpr double kGravitySigma = 0.002;  // relative, variation over the earth
 // Beyond this share the estimate is linearised too far away to be entered anywhere.
 constexpr double kLargeDifference = 0.05;
-
-// Parts of a recording that are left out in turn.
-constexpr std::size_t kParts = 8;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -166,27 +165,6 @@ ScaleFit fitScale(const std::vector<Interval>& intervals, double gravity, double
   return fit;
 }
 
-/// The jackknife's sigma: what the estimate varies by when each part of the recording is left out in turn. It shows
-/// what a single interval has decided, as one whose poses are off. 0: without some part the scale is not known.
-template <class Fit>
-double jackknifeSigma(const std::vector<Interval>& intervals, const Fit& fit) {
-  const std::size_t parts = std::min(intervals.size(), kParts);
-  std::vector<double> factors;
-  for (std::size_t part = 0; part < parts; ++part) {
-    const auto begin = static_cast<std::ptrdiff_t>(part * intervals.size() / parts);
-    const auto end = static_cast<std::ptrdiff_t>((part + 1) * intervals.size() / parts);
-    std::vector<Interval> others(intervals.begin(), intervals.begin() + begin);
-    others.insert(others.end(), intervals.begin() + end, intervals.end());
-    const InertialScale scale = fit(others).scale();
-    if (scale.sigma == 0) return 0;
-    factors.push_back(scale.factor);
-  }
-  double mean = 0, squares = 0;
-  for (const double factor : factors) mean += factor / static_cast<double>(parts);
-  for (const double factor : factors) squares += (factor - mean) * (factor - mean);
-  return std::sqrt(squares * static_cast<double>(parts - 1) / static_cast<double>(parts));
-}
-
 }  // namespace
 
 InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& noise) {
@@ -203,11 +181,14 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
   const double variance = low + share * (high - low);
   InertialScale scale = fitWith(variance).scale();
   if (scale.sigma == 0) return scale;
-  const double varies = jackknifeSigma(intervals, [&](const std::vector<Interval>& others) {
-    return fitScale(others, gravity, noise.accel_random_walk, variance);
-  });
-  if (varies == 0) return {};
-  scale.sigma = std::max(scale.sigma, varies);
+  // The normal equations' sigma knows nothing of a single interval that is wrong, as one whose poses are off.
+  const auto factor = [&](const std::vector<Interval>& others) -> std::optional<double> {
+    const InertialScale found = fitScale(others, gravity, noise.accel_random_walk, variance).scale();
+    return found.sigma > 0 ? std::make_optional(found.factor) : std::nullopt;
+  };
+  const std::optional<double> varies = jackknifeSigma(intervals, factor);
+  if (!varies) return {};
+  scale.sigma = std::max(scale.sigma, *varies);
   return scale;
 }
 

@@ -98,7 +98,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(
         std::to_string(c.imu_faults) + " of " + std::to_string(c.images) +
         " images show a motion that the IMU contradicts, and were tracked without it: shocks, shaking, saturation, or "
-        "axes, signs or units that are wrong?");
+        "axes, signs, units or T_imu_cam that are wrong? check_bag tells");
   if (c.repeated_image > 0)
     all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
                   " images repeat the pixels of the one before under a new stamp and are left out: a camera slower "
