@@ -52,7 +52,7 @@ Findings trialRun(BagSet bags, SensorConfig sensor, double seconds) {
   for (const std::string& missing : {missingPoses(pipeline), otherStates(pipeline.states())})
     if (!missing.empty()) all.push_back({Severity::kWarning, "odometry", missing, "poses are less sure there"});
   const std::string late = depthDelayDifference(pipeline.frontEnd());
-  if (!counters.imuIsWrong() && !late.empty())
+  if (!late.empty())
     all.push_back(
         {Severity::kWarning, "depth delay", late, "a delay that goes with a filter in the driver is not constant"});
   if (all.empty())
