@@ -106,6 +106,10 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     const Matrix6d loop_covariance = (loop_information.transpose() * loop_information).inverse();
     const double pose =
         poseEvidence(solution.chi2, *known + loop_covariance.bottomRightCorner<3, 3>(), extentOf(map, part));
+    if (place.coverage.cells == 0) {
+      event.reason = formatted("%d inliers, but from there the map shows nothing of the image", place.inliers);
+      return event;
+    }
     const double matches = matchEvidence(place.coverage);
     if (matches + pose < options_.graph.min_log_odds) {
       event.reason = formatted(

@@ -88,6 +88,21 @@ TEST(LoopCloser, ALittleTiltMattersNoMoreFarFromTheOrigin) {
   EXPECT_EQ(closed[0], closed[1]);
 }
 
+// Inliers from where the map shows nothing of the image prove no place: nothing can tell how many there should be.
+TEST(LoopCloser, APlaceOfWhichTheMapShowsNothingIsNoPlace) {
+  RingWorld world;
+  Map map;
+  std::vector<SE3> truth;
+  world.walk(map, 1.15, 0.05, &truth);
+  for (const auto& entry : std::map<KeyframeId, MapKeyframe>(map.keyframes().begin(), map.keyframes().end())) {
+    auto blind = std::make_shared<Keyframe>(*entry.second.data);
+    for (Feature& feature : blind->frame.features) feature.depth = 0;
+    map.keyframe(entry.first).data = blind;
+  }
+  LoopCloser closer(LoopOptions(), world.camera());
+  EXPECT_TRUE(closeAll(closer, map).empty());
+}
+
 TEST(LoopCloser, NothingToCloseOnAWayWithoutReturn) {
   RingWorld world;
   Map map;
