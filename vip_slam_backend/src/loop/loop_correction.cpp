@@ -73,6 +73,11 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
   // them. The reference part stays, whichever part the query belongs to, since the other's place was a guess.
   std::set<KeyframeId> part = connectedKeyframes(map, query, loops_);
   const bool tied = part.count(place.match) != 0;
+  // The share of cells tells nothing then, and the term of the pose alone would accept a chance pose near the expected.
+  if (tied && place.coverage.cells == 0) {
+    event.reason = formatted("%d inliers, but from there the map shows nothing of the image", place.inliers);
+    return event;
+  }
   SE3 move = correction;
   if (!tied && referencePart(map, loops_).count(query)) {
     part = connectedKeyframes(map, place.match, loops_);
@@ -106,10 +111,6 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     const Matrix6d loop_covariance = (loop_information.transpose() * loop_information).inverse();
     const double pose =
         poseEvidence(solution.chi2, *known + loop_covariance.bottomRightCorner<3, 3>(), extentOf(map, part));
-    if (place.coverage.cells == 0) {
-      event.reason = formatted("%d inliers, but from there the map shows nothing of the image", place.inliers);
-      return event;
-    }
     const double matches = matchEvidence(place.coverage);
     if (matches + pose < options_.graph.min_log_odds) {
       event.reason = formatted(

@@ -11,7 +11,7 @@
 
 namespace vip_slam {
 
-/// Parts that are left out in turn.
+/// Parts that are left out in turn. Fits to depth ask for half as many keyframes.
 constexpr int kGroups = 20;
 
 /// One sigma of `estimate(items)`, a std::optional<double>, from leaving out each of kGroups parts of the items, or

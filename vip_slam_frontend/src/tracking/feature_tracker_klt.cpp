@@ -21,8 +21,8 @@ struct Brightness {
   double mean, deviation;  ///< grey levels
 };
 
-/// Of the wide patch around a pixel, which lies in the image. For patches as small as this cv::meanStdDev takes ten
-/// times as long.
+/// Of the wide patch around a pixel, which lies in the image. For patches as small as this cv::meanStdDev takes
+/// four to six times as long.
 Brightness brightnessAround(const cv::Mat& gray, const Eigen::Vector2d& uv) {
   constexpr int side = 2 * kWidePatch + 1, n = side * side;
   int sum = 0, squares = 0;
