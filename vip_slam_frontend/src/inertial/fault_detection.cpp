@@ -13,8 +13,8 @@ namespace {
 // Of a single interval: twice the innovation gate. Ordinary images reach the gate in rendered sequences, and nearly
 // twice of it on a real phone, whose images have errors that no covariance knows.
 constexpr double kBeyond = 2 * kGateSigmas;
-// Of a sound IMU's trials so many pass. (0.985, four sigmas, isolates one in the dark of a rendered sequence.)
-constexpr double kTrialProbability = 0.999;
+// Probability that a sound IMU fails one of its trials since its last fault.
+constexpr double kFalseAlarm = 1e-3;
 // A turn by so much shows whether the vertical is right, rad: wrong axes make 3 m/s^2 of it.
 constexpr double kShowsVertical = 0.3;
 
@@ -38,13 +38,15 @@ bool FaultDetection::add(const MotionEvidence& e) {
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;
   const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || isOnProbation(e.t));
-  static const double trial_gate = std::sqrt(chiSquareQuantile(kTrialProbability, 6));
   const bool tried = e.trial && e.trial->duration >= kMoment;
   const bool agrees = tried && e.trial->sigmas < kGateSigmas;
-  const bool fault = begins || goes_on || (tried && e.trial->sigmas > trial_gate && e.t - disagreed_t_ > kFaultMemory);
+  const bool fails = tried && e.t - disagreed_t_ > kFaultMemory && e.trial->sigmas > trialGate();
+  const bool fault = begins || goes_on || fails;
   // Images that cannot tell neither confirm nor contradict.
   if (fault || (tried && !agrees)) agreed_ = 0;
+  if (tried) tried_ += e.interval;
   if (fault) {
+    tried_ = 0;
     if (!isOnProbation(e.t)) first_fault_t_ = e.t;
     isolated_ = true;
     last_fault_t_ = e.t;
@@ -66,6 +68,10 @@ bool FaultDetection::add(const MotionEvidence& e) {
     vertical_confirmed_ = agreement_ >= kShowsVertical;
   }
   return isolated;
+}
+
+double FaultDetection::trialGate() const {
+  return std::sqrt(chiSquareQuantile(1 - kFalseAlarm / (1 + tried_ / kMoment), 6));
 }
 
 }  // namespace vip_slam::frontend

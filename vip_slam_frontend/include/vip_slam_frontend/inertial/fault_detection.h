@@ -50,6 +50,9 @@ class FaultDetection {
  private:
   /// For a while after it is believed again the IMU is at fault as soon as it contradicts.
   bool isOnProbation(double t) const { return isolated_ || t - recovered_t_ < 2 * to_agree_; }
+  /// Sigmas by which a trial fails. Of many independent ones one fails by chance: the probability of a false alarm is
+  /// divided by their number (Bonferroni), so that an IMU which has passed trials for long is believed more firmly.
+  double trialGate() const;
 
   double first_fault_t_ = -1e300, last_fault_t_ = -1e300;  ///< of those that came back on probation
   double disagreed_t_ = -1e300;                            ///< images among themselves
@@ -57,6 +60,7 @@ class FaultDetection {
   double unconfirmed_t_ = -1e300;                          ///< last interval that deviated, or that gave no test
   double began_t_ = -1e300;  ///< first such interval after agreement: a fault may begin there
   bool isolated_ = false;
+  double tried_ = 0;           ///< for how long it has been on trial without a fault, s
   double agreed_ = 0;          ///< for how long trials have agreed, while isolated, s
   double to_agree_ = kMoment;  ///< for how long they have to, as long as faults came back
   /// Until the vertical is confirmed: by how much further the body has turned in agreement than in contradiction,
