@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_frontend/filter/surface_rows.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -175,7 +176,7 @@ SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, con
   }
   A.swap(used);
   triangularise(A, layout.rank());
-  const int rank = layout.rank();
+  const int rank = std::min(layout.rank(), result.used);
   result.rows.H = Eigen::MatrixXd::Zero(rank, window.dimension());
   result.rows.H.middleCols<6>(window.cloneColumn(b)) = A.topLeftCorner(rank, 6);
   result.rows.H.middleCols(window.calibrationColumn(), layout.calibration) = A.block(0, 6, rank, layout.calibration);

@@ -132,6 +132,19 @@ TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
   }
 }
 
+TEST(SurfaceRows, FewerPairsThanStatesAreARowEach) {
+  const CalibrationFlags all{true, true, true, true, true, true, true, true, true, true, true};
+  const WindowState window = makeWindow(3, all);
+  SurfaceMatches matches = makeMatches(window, 4, kRoom, 0.01);
+  matches.pairs.resize(20);
+  const int n = window.dimension();
+  const SurfaceRows rows = surfaceRows(window, 1e-3 * Eigen::MatrixXd::Identity(n, n), matches, 100.0);
+  ASSERT_EQ(rows.used, 20);
+  ASSERT_LT(rows.used, 6 + window.calibration.camera());
+  ASSERT_EQ(rows.rows.H.rows(), rows.used);
+  EXPECT_NEAR(0.5 * rows.rows.r.squaredNorm(), cost(window, matches), 1e-9 * cost(window, matches));
+}
+
 /// Information of the rows on the newest pose, given all others.
 Eigen::Matrix<double, 6, 6> informationOnNewest(const WindowState& window, const SurfaceMatches& matches) {
   const int n = window.dimension();
