@@ -24,7 +24,7 @@ namespace {
 
 using namespace vip_slam;
 
-constexpr double kRevisitSeconds = 30;
+constexpr double kRevisitMetres = 1.5;
 constexpr double kWrongMetres = 0.3, kWrongAngle = 5 * kDegree;
 
 /// A share in per cent; "-" when `all` is zero.
@@ -54,13 +54,14 @@ void judgeLoops(const StoredMap& stored, const TruePoses& truth) {
   std::printf("loops judged %d, wrong %d\n", judged, wrong);
 }
 
-void judgeRevisits(const StoredMap& stored, const TruePoses& truth) {
+/// A revisit is a keyframe at a place that was seen at least `seconds` before.
+void judgeRevisits(const StoredMap& stored, const TruePoses& truth, double seconds) {
   const Map& map = stored.map;
   const auto stamp = [&map](KeyframeId id) { return map.keyframe(id).data->frame.t; };
   std::set<KeyframeId> closed;  // share landmarks with, or are looped to, a keyframe seen long before
   for (const auto& entry : truth) {
     for (const auto& neighbour : map.covisible(entry.first, 10))
-      if (stamp(entry.first) - stamp(neighbour.first) >= kRevisitSeconds) closed.insert(entry.first);
+      if (stamp(entry.first) - stamp(neighbour.first) >= seconds) closed.insert(entry.first);
   }
   for (const auto& loop : stored.loops) closed.insert(loop.first);
   int revisits = 0, found = 0, episodes = 0, episodes_closed = 0;
@@ -76,7 +77,7 @@ void judgeRevisits(const StoredMap& stored, const TruePoses& truth) {
   for (const auto& entry : truth) {
     bool revisit = false;
     for (const auto& other : truth)
-      revisit |= stamp(entry.first) - stamp(other.first) >= kRevisitSeconds && samePlace(entry.second, other.second);
+      revisit |= stamp(entry.first) - stamp(other.first) >= seconds && samePlace(entry.second, other.second, kRevisitMetres);
     if (!revisit) continue;
     if (stamp(entry.first) - last > 3.0) endEpisode();
     open = true;
@@ -141,7 +142,9 @@ int main(int argc, char** argv) {
   line.option("query", query, "map.vsm of another session in the same place");
   line.option("query-truth", query_truth, "its true trajectory, TUM");
   line.option("sensor", sensor, "a shipped sensor or a sensor YAML file, with intrinsics; for relocalisation");
-  line.option("set", settings, "option of relocalisation as key=value (`loop/` of the back end); repeatable");
+  line.option(
+      "set", settings,
+      "option of relocalisation, or min_seconds of a revisit, as key=value (`loop/` of the back end); repeatable");
   line.flag("list", list, "one line per keyframe at a mapped place or found");
   line.needs("query", "query-truth");
   line.needs("query-truth", "query");
@@ -154,7 +157,7 @@ int main(int argc, char** argv) {
     const vip_slam::StoredMap stored = vip_slam::loadMapFile(map, vip_slam::ImuNoise());
     const auto poses = posesOf(stored.map, truth);
     judgeLoops(stored, poses);
-    judgeRevisits(stored, poses);
+    judgeRevisits(stored, poses, options.min_seconds);
     if (!query.empty()) {
       const vip_slam::StoredMap session = vip_slam::loadMapFile(query, vip_slam::ImuNoise());
       const auto session_poses = posesOf(session.map, query_truth);

@@ -10,7 +10,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kTrialSeconds = 1.0;
+constexpr double kTrialSeconds = 1.0, kMappedMetres = 2.0;
 
 // Share of the query's depth grid nodes that lie on surfaces seen by the other depth image; T_o_q: query camera to
 // other camera.
@@ -40,7 +40,7 @@ MappedView mappedView(const Map& map, const TruePoses& truth, const SE3& T_truth
   MappedView view;
   const SE3 T_truth_C = T_truth_I * query.frame.T_I_C, T_C_map = T_truth_C.inverse() * T_truth_map;
   for (const auto& other : truth) {
-    if (!samePlace(T_truth_I, other.second)) continue;
+    if (!samePlace(T_truth_I, other.second, kMappedMetres)) continue;
     const MapKeyframe& kf = map.keyframe(other.first);
     const SE3 T_o_q = (other.second * kf.T_I_C).inverse() * T_truth_C;
     view.overlap = std::max(view.overlap, sharedView(query.frame.depth_grid, kf.data->frame.depth_grid, T_o_q, camera));

@@ -31,8 +31,8 @@ SE3 alignMap(const Map& map, const TruePoses& truth) {
   return align(pairs, Alignment::kYaw);
 }
 
-bool samePlace(const SE3& a, const SE3& b) {
-  return (a.t() - b.t()).norm() <= 2 && a.rotation().angularDistance(b.rotation()) <= 30 * kDegree;
+bool samePlace(const SE3& a, const SE3& b, double metres) {
+  return (a.t() - b.t()).norm() <= metres && a.rotation().angularDistance(b.rotation()) <= 30 * kDegree;
 }
 
 }  // namespace vip_slam

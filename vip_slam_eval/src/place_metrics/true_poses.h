@@ -18,7 +18,7 @@ TruePoses truePoses(const Map& map, const Trajectory& truth);
 /// std::invalid_argument when the truth has none of them.
 SE3 alignMap(const Map& map, const TruePoses& truth);
 
-/// Within 2 m and 30 degrees.
-bool samePlace(const SE3& a, const SE3& b);
+/// Within so many metres and 30 degrees.
+bool samePlace(const SE3& a, const SE3& b, double metres);
 
 }  // namespace vip_slam
