@@ -26,7 +26,7 @@ struct MeasurementOptions {
   double depth_sigma_scale = 1.0;
   double outlier_chi2 = 9.0;
   double plane_prior_deg = 0.5;
-  double homography_inflation = 1.0;
+  double surface_sigma = 0.006;
   bool use_odometry = true;
 
   void visit(OptionVisitor& v) {
@@ -43,8 +43,8 @@ struct MeasurementOptions {
     v.field("depth_sigma_scale", depth_sigma_scale, 0.1, 20.0, "factor on the depth sigma given by the front end");
     v.field("outlier_chi2", outlier_chi2, 2.0, 100.0, "an observation above this squared error (sigmas) is removed");
     v.field("plane_prior_deg", plane_prior_deg, 0.01, 10.0, "one sigma of horizontal and vertical planes, degrees");
-    v.field("homography_inflation", homography_inflation, 1.0, 5.0,
-            "factor on the sigma of homography pairs, for noise that the pairs of one host share");
+    v.field("surface_sigma", surface_sigma, 1e-5, 0.1,
+            "how far points lie beside their plane before the recording tells, one sigma, m");
     v.field("use_odometry", use_odometry,
             "the odometry's motion between successive keyframes, which knows the images and depth in between, counts");
   }

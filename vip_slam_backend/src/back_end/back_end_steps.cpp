@@ -17,6 +17,7 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
     BuilderSettings local = settings;
     local.shared_hosts = options.local_ba.shared_hosts;
     local.middle_hosts = options.local_ba.middle_hosts;
+    local.measure_surfaces = true;
     built = buildProblem(map, localScope(map, options.local_ba), local);
   }
   SolverOptions solver_options;

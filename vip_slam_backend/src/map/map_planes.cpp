@@ -50,6 +50,14 @@ void Map::setPlaneParameters(PlaneId id, const Plane& parameters) {
   it->second.optimised = true;
 }
 
+void Map::setSurfaceVariance(PlaneId id, double variance) {
+  const auto it = planes_.find(id);
+  if (it == planes_.end()) throw MapError("no plane " + std::to_string(id) + " in the map");
+  if (!(variance > 0) || !std::isfinite(variance))
+    throw MapError("plane " + std::to_string(id) + ": the variance of its surface is not positive and finite");
+  it->second.surface_variance = variance;
+}
+
 void Map::movePlane(PlaneId id, const SE3& motion) {
   const auto it = planes_.find(id);
   if (it == planes_.end()) throw MapError("no plane " + std::to_string(id) + " in the map");

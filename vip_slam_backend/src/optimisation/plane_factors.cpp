@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "homography_hosts.h"
+#include "surface_scatter.h"
 #include "vip_slam_backend/solver/robust.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"
@@ -62,6 +63,16 @@ std::vector<char> PlaneFactorBuilder::addHomographies(const LandmarkViews& views
   }
   const std::vector<int> hosts =
       chooseHosts(views, plane, built_->problem.planes, geometry_, settings_.shared_hosts, settings_.middle_hosts);
+  const std::vector<backend::OffPlane> off =
+      backend::distancesOffPlane(views, plane, hosts, built_->problem.planes, geometry_);
+  const double sigma = settings_.measurement.surface_sigma;
+  if (settings_.measure_surfaces)
+    built_->surface_variances = backend::surfaceVariances(off, plane, planes_.size(), sigma);
+  const auto surface = [&](int p) {
+    if (settings_.measure_surfaces) return built_->surface_variances[p];
+    const double measured = map_.planes().at(built_->planes[p]).surface_variance;
+    return measured > 0 ? measured : sigma * sigma;
+  };
   // Grouped by plane and host, so that the homographies shared by a group's pairs are computed once.
   struct Member {
     int plane, host, landmark;
@@ -71,7 +82,8 @@ std::vector<char> PlaneFactorBuilder::addHomographies(const LandmarkViews& views
   };
   std::vector<Member> members;
   for (int l = 0; l < views.size(); ++l)
-    if (hosts[l] >= 0) members.push_back({plane[l], views.begin(l)[hosts[l]].frame, l});
+    if (hosts[l] >= 0 && backend::liesOnPlane(off[l], surface(plane[l])))
+      members.push_back({plane[l], views.begin(l)[hosts[l]].frame, l});
   std::sort(members.begin(), members.end());
   std::vector<int> slot(geometry_.size(), -1);
   std::vector<Observer> observers;
@@ -105,10 +117,9 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
   const Plane& parameters = built_->problem.planes[plane].plane;
   const LandmarkView& host = views.begin(landmark)[host_view];
   const bool host_fixed = built_->problem.frames[host.frame].fixed;
-  // Inflated variances; outliers are judged with at least the gate's variance.
+  // Outliers are judged with at least the gate's variance.
   const auto square = [](double x) { return x * x; };
-  const double inflation = square(options.homography_inflation), gate = inflation / square(built_->gate_weight);
-  const double host_variance = square(host.sigma) * inflation;
+  const double gate = 1 / square(built_->gate_weight), host_variance = square(host.sigma);
   const double host_judged = std::max(host_variance, gate);
   const Eigen::Vector2d xy_i = host.xy.cast<double>();
   pairs_.clear();
@@ -126,7 +137,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     // The pair's variance: the observer's plus the host's transferred into the observer, on the way to which it shrinks
     // where that sees the plane edge-on.
     const double gain = hostNoiseGain(observer.h, p);
-    const double own = square(v->sigma) * inflation;
+    const double own = square(v->sigma);
     const double variance = own + gain * host_variance, judged = std::max(own, gate) + gain * host_judged;
     // After compression outliers cannot be down-weighted: gate and weight here, at the present estimate.
     const Eigen::Vector2d xy_j = v->xy.cast<double>();

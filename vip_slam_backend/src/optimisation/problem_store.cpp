@@ -88,6 +88,8 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   const std::vector<char> held = heldPlanes(problem);
   for (std::size_t p = 0; p < built.planes.size(); ++p)
     if (held[p] && map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
+  for (std::size_t p = 0; p < built.surface_variances.size(); ++p)
+    if (map->hasPlane(built.planes[p])) map->setSurfaceVariance(built.planes[p], built.surface_variances[p]);
   LandmarkSet done(built.points.size() + built.plane_points.size());
   for (std::size_t p = 0; p < built.points.size(); ++p) {
     if (done.contains(built.points[p])) continue;  // another track of the landmark

@@ -29,6 +29,7 @@ Map adjusted(const Map& map, const SimulatedKeyframes& world, const Adjustment& 
   GlobalBaProblem job;
   job.map = std::make_shared<const Map>(map);
   job.settings.focal = world.sensor().camera.fx;
+  job.settings.measurement.surface_sigma = 1e-5;  // flat: points say where it is, too
   job.solver = how.solver;
   Map out = map;
   if (how.global) {

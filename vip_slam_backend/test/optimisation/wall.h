@@ -27,6 +27,7 @@ struct Wall {
       LandmarkId odd = 0, const std::function<double(int)>& shift = [](int) { return 0.0; },
       const DepthNoiseParts& parts = {1, 0}) {
     settings.focal = kFocal;
+    settings.measurement.surface_sigma = 1e-5;  // flat
     settings.depth_noise.a = 0.005;
     settings.depth_noise.b = 0;
     const ImuNoise noise;

@@ -261,6 +261,8 @@ class Simulator {
       const Plane drifted = transformPlane(entry.second, world_.planes[entry.first].plane);
       if (!fitPlane(surfaces[entry.first], PlaneKind::kGeneral, drifted.n, &e.plane)) e.plane = drifted;
       out->map.setPlane(e);
+      // Flat to a tenth of a millimetre, as local adjustments would have found.
+      out->map.setSurfaceVariance(e.id, 1e-8);
     }
     for (const PlaneObservation& o : observations) out->map.setPlaneObservation(o);
     for (std::size_t p = 0; p < points_.size(); ++p)

@@ -88,6 +88,8 @@ class Map {
   /// Adds or updates; keeps the map's plane parameters when they have been optimised already.
   void setPlane(const PlaneEstimate& estimate);
   void setPlaneParameters(PlaneId id, const Plane& plane);
+  /// How far points of a plane lie beside it; `variance` > 0, m^2.
+  void setSurfaceVariance(PlaneId id, double variance);
   /// Moves the plane by `motion`, new from old world, as the keyframes that see it were moved.
   void movePlane(PlaneId id, const SE3& motion);
   /// `from` becomes part of `into`, with its observations and landmarks; nothing when `from` is unknown.

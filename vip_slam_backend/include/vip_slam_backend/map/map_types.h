@@ -66,7 +66,8 @@ struct MapLandmark {
 
 struct MapPlane {
   PlaneEstimate estimate;
-  bool optimised = false;  ///< has been a variable of a bundle adjustment
+  bool optimised = false;       ///< has been a variable of a bundle adjustment
+  double surface_variance = 0;  ///< by which its points lie beside it, m^2; 0: not measured
 };
 
 }  // namespace vip_slam

@@ -37,8 +37,9 @@ struct BuiltProblem {
   std::vector<KeyframeId> frames;  ///< per problem frame; 0: the world frame of outside planes
   std::vector<LandmarkId> points;  ///< landmark of each point, one point per track, a landmark's longest track first
   std::vector<PlaneId> planes;
-  std::vector<LandmarkId> plane_points;  ///< landmarks that occur in homographies only (vip)
-  std::vector<RefusedView> refused;      ///< gated views of those
+  std::vector<double> surface_variances;  ///< of the planes, m^2, when they were measured
+  std::vector<LandmarkId> plane_points;   ///< landmarks that occur in homographies only (vip)
+  std::vector<RefusedView> refused;       ///< gated views of those
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
   DepthNoiseParts depth_noise;  ///< of the recording, learnt by the front end
@@ -50,7 +51,10 @@ struct BuilderSettings {
   MeasurementOptions measurement;
   bool shared_hosts = true;   ///< of homographies: few hosts for many landmarks, instead of first views
   bool middle_hosts = false;  ///< shared ones from the middle of the landmarks' tracks only
-  double focal = 500;         ///< px
+  /// How far landmarks lie beside their planes is measured with the poses as they are, which must fit each other, as in
+  /// a local adjustment; else as the map knows it.
+  bool measure_surfaces = false;
+  double focal = 500;  ///< px
   DepthNoise depth_noise;
   Eigen::Vector3d gravity = gravityVector();
 };
