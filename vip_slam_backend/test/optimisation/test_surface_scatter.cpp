@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "optimisation/wall.h"
 #include "../../src/optimisation/surface_scatter.h"
+#include "optimisation/wall.h"
 
 using namespace vip_slam;
 using backend::OffPlane;
@@ -56,9 +56,7 @@ TEST(SurfaceScatter, IsFoundWhateverWasAssumed) {
   EXPECT_NEAR(meanOfSeeds(200, 0.005, 1e-8), 0.005, 0.0005);
 }
 
-TEST(SurfaceScatter, OfAFlatSurfaceIsBelowItsPointsNoise) {
-  EXPECT_LT(meanOfSeeds(1000, 0), 0.002);
-}
+TEST(SurfaceScatter, OfAFlatSurfaceIsBelowItsPointsNoise) { EXPECT_LT(meanOfSeeds(1000, 0), 0.002); }
 
 TEST(SurfaceScatter, FewPointsLeaveWhatWasAssumed) {
   EXPECT_NEAR(surfaceVariance({}, kPrior), kPrior, 0.02 * kPrior);

@@ -77,7 +77,8 @@ void judgeRevisits(const StoredMap& stored, const TruePoses& truth, double secon
   for (const auto& entry : truth) {
     bool revisit = false;
     for (const auto& other : truth)
-      revisit |= stamp(entry.first) - stamp(other.first) >= seconds && samePlace(entry.second, other.second, kRevisitMetres);
+      revisit |=
+          stamp(entry.first) - stamp(other.first) >= seconds && samePlace(entry.second, other.second, kRevisitMetres);
     if (!revisit) continue;
     if (stamp(entry.first) - last > 3.0) endEpisode();
     open = true;
